@@ -1,0 +1,114 @@
+//! The bytes of a log file: plain or gzipped text, told by content.
+
+use crate::error::{LogError, LogErrorKind};
+use flate2::read::MultiGzDecoder;
+use std::io::Read;
+use std::path::Path;
+
+/// The text of a file, still as bytes, and whether its compressed data ended early.
+#[derive(Debug)]
+pub(crate) struct Contents {
+    pub bytes: Vec<u8>,
+    pub cut: bool,
+}
+
+/// First bytes of files that are something else.
+const OTHERS: [(&[u8], &str); 10] = [
+    (b"PAR1", "a Parquet file"),
+    (b"\x89MCAP0", "an MCAP file"),
+    (b"PK\x03\x04", "a zip archive (npz, xlsx)"),
+    (b"#ROSBAG", "a ROS 1 bag"),
+    (b"SQLite format 3", "an SQLite file (ROS 2 bag)"),
+    (b"\x93NUMPY", "a NumPy array"),
+    (b"\x89HDF", "an HDF5 file"),
+    (b"MATLAB 5.0", "a MATLAB file"),
+    (b"\x28\xb5\x2f\xfd", "zstd-compressed"),
+    (b"BZh", "bzip2-compressed"),
+];
+
+/// Reads a file whole and unpacks it where it is gzipped. Errors do not carry the file's name yet.
+pub(crate) fn read(path: &Path) -> Result<Contents, LogError> {
+    if path.is_dir() {
+        return Err(LogError::new(LogErrorKind::CannotRead, "this is a folder").hint("Name the log files in it"));
+    }
+    let bytes = std::fs::read(path).map_err(|error| {
+        let hint = if error.kind() == std::io::ErrorKind::NotFound { "Check the path" } else { "" };
+        LogError::new(LogErrorKind::CannotRead, format!("the file cannot be read: {error}")).hint(hint)
+    })?;
+    unpack(bytes)
+}
+
+/// Unpacks the bytes of a file.
+pub(crate) fn unpack(bytes: Vec<u8>) -> Result<Contents, LogError> {
+    let mut contents = if bytes.starts_with(&[0x1f, 0x8b]) {
+        let mut text = Vec::with_capacity(bytes.len().saturating_mul(3));
+        match MultiGzDecoder::new(bytes.as_slice()).read_to_end(&mut text) {
+            Ok(_) => Contents { bytes: text, cut: false },
+            Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => Contents { bytes: text, cut: true },
+            Err(error) => {
+                return Err(LogError::new(LogErrorKind::CannotRead, format!("the gzip data is damaged: {error}"))
+                    .hint("Copy the file again from its source"));
+            }
+        }
+    } else {
+        Contents { bytes, cut: false }
+    };
+    if contents.bytes.is_empty() {
+        return Err(LogError::new(LogErrorKind::Empty, "the file is empty")
+            .hint("A log has a header row and one row per sample"));
+    }
+    if contents.bytes.starts_with(&[0xef, 0xbb, 0xbf]) {
+        contents.bytes.drain(..3);
+    }
+    if let Some((_, what)) = OTHERS.iter().find(|(magic, _)| contents.bytes.starts_with(magic)) {
+        return Err(LogError::new(LogErrorKind::UnknownContainer, format!("this is {what}, not CSV"))
+            .hint("Export it as CSV or gzipped CSV"));
+    }
+    if contents.bytes.starts_with(&[0xff, 0xfe]) || contents.bytes.starts_with(&[0xfe, 0xff]) {
+        return Err(LogError::new(LogErrorKind::Encoding, "the text is UTF-16").row(1).hint("Save it as UTF-8"));
+    }
+    Ok(contents)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn gzipped(text: &[u8]) -> Vec<u8> {
+        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+        encoder.write_all(text).unwrap();
+        encoder.finish().unwrap()
+    }
+
+    #[test]
+    fn gzip_is_told_by_content() {
+        let contents = unpack(gzipped(b"time\n1\n")).unwrap();
+        assert_eq!(contents.bytes, b"time\n1\n");
+        assert!(!contents.cut);
+        let two = [gzipped(b"time\n"), gzipped(b"1\n")].concat();
+        assert_eq!(unpack(two).unwrap().bytes, b"time\n1\n");
+    }
+
+    #[test]
+    fn a_cut_and_a_damaged_gzip_are_told_apart() {
+        let text: Vec<u8> =
+            (0..4000u32).flat_map(|i| format!("{},{}\n", i, i.wrapping_mul(2654435761)).into_bytes()).collect();
+        let packed = gzipped(&text);
+        let cut = unpack(packed[..packed.len() / 2].to_vec()).unwrap();
+        assert!(cut.cut && text.starts_with(&cut.bytes));
+        let mut damaged = packed.clone();
+        let middle = damaged.len() / 2;
+        damaged[middle..middle + 40].fill(0xa5);
+        assert_eq!(unpack(damaged).unwrap_err().kind, LogErrorKind::CannotRead);
+    }
+
+    #[test]
+    fn other_containers_are_named() {
+        assert!(unpack(b"PAR1....".to_vec()).unwrap_err().found.contains("Parquet"));
+        assert_eq!(unpack(vec![]).unwrap_err().kind, LogErrorKind::Empty);
+        assert_eq!(unpack(vec![0xff, 0xfe, b't', 0]).unwrap_err().kind, LogErrorKind::Encoding);
+        assert_eq!(unpack(b"\xef\xbb\xbftime".to_vec()).unwrap().bytes, b"time");
+        assert_eq!(read(Path::new("/")).unwrap_err().kind, LogErrorKind::CannotRead);
+    }
+}

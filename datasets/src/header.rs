@@ -1,0 +1,351 @@
+//! Which column of a file feeds which quantity: the header against the robot's joints and the column map.
+
+use crate::column_map::ColumnMap;
+use crate::episode::Channel;
+use crate::error::{LogError, LogErrorKind};
+use std::collections::BTreeSet;
+
+/// One column that is read.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Feed {
+    /// Index of the column in a row.
+    pub index: usize,
+    /// Header of the column.
+    pub column: String,
+    /// Factor to the SI unit.
+    pub scale: f64,
+    /// What it feeds; `None` for time.
+    pub channel: Option<Channel>,
+}
+
+/// Which columns are read, and what they feed.
+#[derive(Debug, Clone)]
+pub(crate) struct Plan {
+    /// Number of cells in a row.
+    pub width: usize,
+    /// Time first, then the joints of each of `channels` in turn.
+    pub feeds: Vec<Feed>,
+    /// Channels that the file carries for every joint.
+    pub channels: Vec<Channel>,
+    /// Joints for which the disturbance is zero, for want of a column.
+    pub undisturbed: Vec<usize>,
+    /// What was left out, about the file.
+    pub notes: Vec<String>,
+}
+
+/// Reads the header: which of `columns` feed the channels of `joints`. Errors do not carry the file's name yet.
+pub(crate) fn plan(columns: &[String], joints: &[String], map: &ColumnMap) -> Result<Plan, LogError> {
+    let header = Header { columns, joints, map };
+    header.check_is_header()?;
+    let mut used = BTreeSet::new();
+    let time = header.time()?;
+    used.insert(time.index);
+    let mut plan = Plan {
+        width: columns.len(),
+        feeds: vec![time],
+        channels: Vec::new(),
+        undisturbed: Vec::new(),
+        notes: Vec::new(),
+    };
+    if let Some((channel, joint)) = map.unknown_joint(joints) {
+        return Err(LogError::new(
+            LogErrorKind::UnknownJoint,
+            format!("the column map feeds `{}.{joint}`, a joint that the robot does not have", channel.name()),
+        )
+        .hint(header.known_joints()));
+    }
+    for channel in Channel::ALL {
+        let found = joints.iter().map(|joint| header.feed(channel, joint)).collect::<Result<Vec<_>, _>>()?;
+        used.extend(found.iter().flatten().map(|feed| feed.index));
+        header.take(channel, found, &mut plan)?;
+    }
+    header.check_unknown_joints(&used)?;
+    header.note_unread(&used, &mut plan);
+    Ok(plan)
+}
+
+struct Header<'a> {
+    columns: &'a [String],
+    joints: &'a [String],
+    map: &'a ColumnMap,
+}
+
+impl Header<'_> {
+    fn check_is_header(&self) -> Result<(), LogError> {
+        let named = self.columns.iter().filter(|column| !column.is_empty());
+        let numbers = named.clone().filter(|column| column.parse::<f64>().is_ok()).count();
+        if numbers > 0 && 2 * numbers > named.count() {
+            return Err(LogError::new(LogErrorKind::NoHeader, "the first line holds numbers, not names of columns")
+                .row(1)
+                .hint(format!("Put a header above it: time,{}", self.native_names(Channel::Position))));
+        }
+        Ok(())
+    }
+
+    fn native_names(&self, channel: Channel) -> String {
+        let names: Vec<String> =
+            self.joints.iter().take(3).map(|joint| format!("{}.{joint}", channel.name())).collect();
+        format!("{}{}", names.join(","), if self.joints.len() > 3 { ",…" } else { "" })
+    }
+
+    fn known_joints(&self) -> String {
+        format!("The robot's joints are {}", self.joints.join(", "))
+    }
+
+    /// The column of this name, if the file has it; an error where it has two.
+    fn find(&self, name: &str) -> Result<Option<usize>, LogError> {
+        let name = name.trim();
+        if self.map.ignores(name) {
+            return Ok(None);
+        }
+        let mut places = (0..self.columns.len()).filter(|&index| self.columns[index] == name);
+        let first = places.next();
+        if let (Some(first), Some(second)) = (first, places.next()) {
+            return Err(LogError::new(
+                LogErrorKind::DoubledColumn,
+                format!("columns {} and {} have this same name", first + 1, second + 1),
+            )
+            .row(1)
+            .column(name)
+            .hint("Keep one of the two, or rename one"));
+        }
+        Ok(first)
+    }
+
+    fn time(&self) -> Result<Feed, LogError> {
+        if let Some(source) = self.map.time() {
+            let index = self.find(&source.column)?.ok_or_else(|| self.not_in_file(&source.column, "time"))?;
+            return Ok(Feed { index, column: source.column.clone(), scale: source.scale, channel: None });
+        }
+        if let Some(index) = self.find("time")? {
+            return Ok(Feed { index, column: "time".to_owned(), scale: 1.0, channel: None });
+        }
+        let missing = LogError::new(LogErrorKind::MissingColumn, "the log has no such column").row(1).column("time");
+        let looks_like_time = |column: &&String| {
+            let name = column.to_lowercase();
+            ["t", "sec", "secs", "seconds"].contains(&name.as_str()) || name.contains("time") || name.contains("stamp")
+        };
+        Err(match self.columns.iter().find(looks_like_time) {
+            Some(near) => missing.hint(format!("If `{near}` is the time in seconds: --map \"time={near}\"")),
+            None => {
+                missing.hint(format!("Time in seconds is needed; the file's columns are {}", list(self.columns, 8)))
+            }
+        })
+    }
+
+    /// The column that feeds one quantity, if any.
+    fn feed(&self, channel: Channel, joint: &str) -> Result<Option<Feed>, LogError> {
+        let native = format!("{}.{}", channel.name(), joint.trim());
+        match self.map.source(channel, joint) {
+            Some((source, named)) => match self.find(&source.column)? {
+                Some(index) => {
+                    Ok(Some(Feed { index, column: source.column, scale: source.scale, channel: Some(channel) }))
+                }
+                None if named => Err(self.not_in_file(&source.column, &native)),
+                None => Ok(None),
+            },
+            None => {
+                Ok(self.find(&native)?.map(|index| Feed { index, column: native, scale: 1.0, channel: Some(channel) }))
+            }
+        }
+    }
+
+    fn not_in_file(&self, column: &str, target: &str) -> LogError {
+        let error = LogError::new(
+            LogErrorKind::MissingColumn,
+            format!("the column map takes `{target}` from here, but the file has no such column"),
+        )
+        .row(1)
+        .column(column);
+        let near = self.near(column);
+        error.hint(if near.is_empty() {
+            format!("The file's columns are {}", list(self.columns, 8))
+        } else {
+            format!("Near it: {}", list(&near, 3))
+        })
+    }
+
+    /// Columns whose names resemble this one.
+    fn near(&self, name: &str) -> Vec<String> {
+        let plain = |text: &str| -> String {
+            text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+        };
+        let wanted = plain(name);
+        if wanted.is_empty() {
+            return Vec::new();
+        }
+        let resembles = |column: &&String| {
+            let column = plain(column);
+            !column.is_empty() && (column.contains(&wanted) || wanted.contains(&column))
+        };
+        self.columns.iter().filter(resembles).cloned().collect()
+    }
+
+    /// Enters a channel in the plan, where every joint has it.
+    fn take(&self, channel: Channel, found: Vec<Option<Feed>>, plan: &mut Plan) -> Result<(), LogError> {
+        let missing: Vec<usize> = (0..found.len()).filter(|&joint| found[joint].is_none()).collect();
+        let name = channel.name();
+        if missing.is_empty() {
+            plan.channels.push(channel);
+        } else if channel.is_needed() {
+            return Err(self.missing(channel, &missing));
+        } else if missing.len() < found.len() {
+            let joints: Vec<String> = missing.iter().map(|&joint| self.joints[joint].clone()).collect();
+            if channel == Channel::Disturbance {
+                plan.notes.push(format!("has no column disturbance.* for {}: taken as zero there", joints.join(", ")));
+                plan.channels.push(channel);
+                plan.undisturbed = missing;
+            } else {
+                plan.notes.push(format!(
+                    "has no column {name}.* for {}: {name} is left out for all joints; give it for all, or for none",
+                    joints.join(", ")
+                ));
+                return Ok(());
+            }
+        } else {
+            return Ok(());
+        }
+        plan.feeds.extend(found.into_iter().flatten());
+        Ok(())
+    }
+
+    /// A needed channel that lacks joints.
+    fn missing(&self, channel: Channel, missing: &[usize]) -> LogError {
+        let name = channel.name();
+        let joint = &self.joints[missing[0]];
+        let target = format!("{name}.{joint}");
+        let native =
+            |column: &&String| column.split_once('.').is_some_and(|(channel, _)| Channel::from_name(channel).is_some());
+        let names: Vec<String> = missing.iter().map(|&joint| self.joints[joint].clone()).collect();
+        let error =
+            LogError::new(LogErrorKind::MissingJoint, format!("no column feeds the {name} of {}", list(&names, 8)))
+                .row(1)
+                .column(&target);
+        let near: Vec<String> = self.near(joint).into_iter().filter(|column| !native(&column)).collect();
+        let foreign: Vec<String> = self
+            .columns
+            .iter()
+            .filter(|column| !native(column) && !column.is_empty() && *column != "time")
+            .cloned()
+            .collect();
+        error.hint(if !near.is_empty() {
+            format!("If one of {} holds it: --map \"{target}={}\"", list(&near, 3), near[0])
+        } else if !foreign.is_empty() {
+            format!("If one of {} holds it: --map \"{target}=<that column>\"", list(&foreign, 6))
+        } else {
+            "Log every joint of the URDF, or make joints that do not move `fixed` in the URDF".to_owned()
+        })
+    }
+
+    /// Native columns of joints that the robot lacks.
+    fn check_unknown_joints(&self, used: &BTreeSet<usize>) -> Result<(), LogError> {
+        for (index, column) in self.columns.iter().enumerate() {
+            let Some((channel, joint)) = column.split_once('.') else {
+                continue;
+            };
+            if used.contains(&index) || Channel::from_name(channel).is_none() || self.map.ignores(column) {
+                continue;
+            }
+            if !self.joints.iter().any(|known| known.trim() == joint) {
+                return Err(LogError::new(LogErrorKind::UnknownJoint, format!("the robot has no joint `{joint}`"))
+                    .row(1)
+                    .column(column)
+                    .hint(format!(
+                        "{}. A column that is not to be read: --map \"ignore={column}\"",
+                        self.known_joints()
+                    )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Says which columns are not read.
+    fn note_unread(&self, used: &BTreeSet<usize>, plan: &mut Plan) {
+        let unread = |(index, column): (usize, &String)| {
+            let partial = column.split_once('.').is_some_and(|(channel, _)| {
+                Channel::from_name(channel).is_some_and(|channel| !plan.channels.contains(&channel))
+            });
+            let skip = used.contains(&index) || self.map.ignores(column) || partial;
+            (!skip).then(|| {
+                if column.is_empty() { format!("(column {}, without a name)", index + 1) } else { column.clone() }
+            })
+        };
+        // A comma at the end of the header makes one column without a name; nothing is lost with it.
+        let trailing = self.columns.last().is_some_and(String::is_empty);
+        let columns = &self.columns[..self.columns.len() - usize::from(trailing)];
+        let unread: Vec<String> = columns.iter().enumerate().filter_map(unread).collect();
+        if !unread.is_empty() {
+            plan.notes.push(format!("columns that are not read: {}", list(&unread, 12)));
+        }
+    }
+}
+
+/// The first `most` names, and how many more there are.
+fn list(names: &[String], most: usize) -> String {
+    let shown: Vec<String> = names.iter().take(most).map(|name| format!("`{name}`")).collect();
+    let more = names.len().saturating_sub(most);
+    if more > 0 { format!("{} and {more} more", shown.join(", ")) } else { shown.join(", ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn columns(text: &str) -> Vec<String> {
+        text.split(',').map(str::to_owned).collect()
+    }
+
+    fn planned(header: &str, map: &[&str]) -> Result<Plan, LogError> {
+        plan(&columns(header), &columns("a,b"), &ColumnMap::from_pairs(map).unwrap())
+    }
+
+    const FULL: &str = "time,position.a,position.b,effort.a,effort.b";
+
+    #[test]
+    fn native_names_are_found_in_any_order() {
+        let plan = planned("effort.b,position.b,time,position.a,effort.a", &[]).unwrap();
+        assert_eq!(plan.feeds.iter().map(|feed| feed.index).collect::<Vec<_>>(), [2, 3, 1, 4, 0]);
+        assert_eq!(plan.channels, [Channel::Position, Channel::Effort]);
+        assert!(plan.notes.is_empty());
+    }
+
+    #[test]
+    fn a_map_overrides_a_native_column() {
+        let plan = planned(&format!("{FULL},raw"), &["effort.a=raw"]).unwrap();
+        assert_eq!(plan.feeds[3].index, 5);
+        assert!(plan.notes[0].contains("`effort.a`"), "{:?}", plan.notes);
+    }
+
+    #[test]
+    fn joints_that_are_unknown_missing_or_doubled_are_errors() {
+        let kind = |header: &str, map: &[&str]| planned(header, map).unwrap_err().kind;
+        assert_eq!(kind(&format!("{FULL},velocity.c"), &[]), LogErrorKind::UnknownJoint);
+        assert_eq!(kind(FULL, &["velocity.c=x"]), LogErrorKind::UnknownJoint);
+        assert_eq!(kind("time,position.a,effort.a,effort.b", &[]), LogErrorKind::MissingJoint);
+        assert_eq!(kind(&format!("{FULL},effort.a"), &[]), LogErrorKind::DoubledColumn);
+        assert_eq!(kind(FULL, &["velocity.a=x"]), LogErrorKind::MissingColumn);
+        assert_eq!(kind("stamp,position.a,position.b,effort.a,effort.b", &[]), LogErrorKind::MissingColumn);
+        assert_eq!(kind("0.0,1.0,2.0,3", &[]), LogErrorKind::NoHeader);
+        assert!(planned(&format!("{FULL},velocity.c"), &["ignore=velocity.c"]).is_ok());
+        let error = planned("time,q_a,q_b,effort.a,effort.b", &[]).unwrap_err();
+        assert!(error.hint.contains("position.a=q_a"), "{error}");
+        let error = planned(&format!("{FULL},velocity.c"), &[]).unwrap_err();
+        assert!(error.to_string().contains("joints are a, b"), "{error}");
+    }
+
+    #[test]
+    fn a_channel_of_some_joints_is_left_out_and_a_disturbance_is_zero() {
+        let plan = planned(&format!("{FULL},velocity.a"), &[]).unwrap();
+        assert_eq!(plan.channels, [Channel::Position, Channel::Effort]);
+        assert!(plan.notes.len() == 1 && plan.notes[0].contains("velocity"), "{:?}", plan.notes);
+        let plan = planned(&format!("{FULL},disturbance.b"), &[]).unwrap();
+        assert_eq!(plan.channels.last(), Some(&Channel::Disturbance));
+        assert_eq!(plan.undisturbed, [0]);
+    }
+
+    #[test]
+    fn other_columns_are_listed_once() {
+        let plan = planned(&format!("{FULL},torque.a,mode,"), &[]).unwrap();
+        assert_eq!(plan.notes, ["columns that are not read: `torque.a`, `mode`"]);
+    }
+}

@@ -1,0 +1,153 @@
+//! The corrected model as a file, schema `gapscope.model/1`: what a diagnosis found, ready to be put on other logs.
+
+use crate::signals::Signals;
+use gapscope_dynamics::Model;
+use gapscope_effects::{Effect, EffectError, Plant};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The public name of the schema.
+pub const MODEL_SCHEMA: &str = "gapscope.model/1";
+
+/// A nominal robot's corrections. Reading back what was written gives the same model to the bit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Corrected {
+    /// Always [`MODEL_SCHEMA`].
+    pub schema: String,
+    /// Name of the robot in its URDF.
+    pub robot: String,
+    /// Weight of each joint in overall torque figures, 1/(N m) or 1/N; 0 for joints that did not move.
+    pub weights: BTreeMap<String, f64>,
+    /// Speed below which each joint counts as standing, rad/s or m/s.
+    pub standstill: BTreeMap<String, f64>,
+    /// Cut-off of the comparison, Hz.
+    pub band: f64,
+    /// Which side of the gear the encoder sits on.
+    pub encoder_side: EncoderSide,
+    /// Time by which the logged effort acts late against the position, within half a sample; s. A trait of the logger, no effect.
+    pub alignment: f64,
+    /// The effects.
+    pub effects: Vec<Effect>,
+}
+
+/// Side of the transmission at which position is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EncoderSide {
+    /// The logged position is the link's.
+    Link,
+    /// The logged position is the motor's.
+    Motor,
+}
+
+/// Why a corrected model cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CorrectedError {
+    /// Not JSON, or not of this shape.
+    #[error("not a corrected model ({0}); expected the corrected.json that `gapscope diagnose` writes")]
+    Unreadable(#[from] serde_json::Error),
+    /// Another schema.
+    #[error("schema is `{0}`, expected `{MODEL_SCHEMA}`; write the file anew with this version's `gapscope diagnose`")]
+    Schema(String),
+    /// A joint is missing or unknown.
+    #[error("made for the joints {found}, but the robot has {expected}; use the URDF that the diagnosis was made with")]
+    Joints {
+        /// Joints in the file.
+        found: String,
+        /// Joints of the robot.
+        expected: String,
+    },
+    /// A number that cannot be.
+    #[error("`{field}` of {joint} is {value}, expected {expected}")]
+    Value {
+        /// Field of the file.
+        field: &'static str,
+        /// Joint, or `the robot`.
+        joint: String,
+        /// Value found.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// An effect that the robot cannot have.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+}
+
+impl Corrected {
+    /// The JSON text.
+    ///
+    /// # Errors
+    /// None in practice: every field has a JSON form.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string_pretty(self)
+    }
+
+    /// Reads the JSON text and checks it against a robot.
+    ///
+    /// # Errors
+    /// What is wrong with the text, or why it does not fit the robot.
+    pub fn from_json(text: &str, model: &Model) -> Result<Corrected, CorrectedError> {
+        let corrected: Corrected = serde_json::from_str(text)?;
+        if corrected.schema != MODEL_SCHEMA {
+            return Err(CorrectedError::Schema(corrected.schema));
+        }
+        for (field, map) in [("weights", &corrected.weights), ("standstill", &corrected.standstill)] {
+            let mut names: Vec<&str> = model.joints().iter().map(|j| j.name.as_str()).collect();
+            names.sort_unstable();
+            if !map.keys().map(String::as_str).eq(names.iter().copied()) {
+                let found = map.keys().cloned().collect::<Vec<_>>().join(", ");
+                return Err(CorrectedError::Joints { found, expected: names.join(", ") });
+            }
+            if let Some((joint, &value)) = map.iter().find(|(_, v)| !(v.is_finite() && **v >= 0.0)) {
+                let expected = "a number of zero or more";
+                return Err(CorrectedError::Value { field, joint: joint.clone(), value, expected });
+            }
+        }
+        for (field, value, allowed, expected) in [
+            ("band", corrected.band, corrected.band > 0.0 && corrected.band.is_finite(), "a frequency above zero"),
+            ("alignment", corrected.alignment, corrected.alignment.abs() < 1.0, "a time below one second"),
+        ] {
+            if !allowed {
+                return Err(CorrectedError::Value { field, joint: "the robot".into(), value, expected });
+            }
+        }
+        Plant::new(model, &corrected.effects, 1e-3)?;
+        Ok(corrected)
+    }
+
+    /// Residual torque of a measured motion with the corrections, joint-major like the signals; N m or N.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn residual(&self, model: &Model, signals: &Signals) -> Result<Vec<Vec<f64>>, EffectError> {
+        let standstill = per_joint(model, &self.standstill);
+        Ok(residual(&mut Plant::new(model, &self.effects, signals.dt)?, signals, &standstill, self.alignment))
+    }
+}
+
+/// Values of a map by joint name, in model order; 0 where a joint is missing.
+pub fn per_joint(model: &Model, map: &BTreeMap<String, f64>) -> Vec<f64> {
+    model.joints().iter().map(|j| map.get(&j.name).copied().unwrap_or(0.0)).collect()
+}
+
+/// Residual torque of a measured motion on a plant, joint-major like the signals; N m or N.
+pub fn residual(plant: &mut Plant, signals: &Signals, standstill: &[f64], alignment: f64) -> Vec<Vec<f64>> {
+    let n = standstill.len();
+    let mut out = vec![Vec::with_capacity(signals.len()); n];
+    let [mut q, mut v, mut a, mut tau, mut rest] = std::array::from_fn(|_| vec![0.0; n]);
+    for k in 0..signals.len() {
+        Signals::gather(&signals.q, k, &mut q);
+        Signals::gather(&signals.v, k, &mut v);
+        Signals::gather(&signals.a, k, &mut a);
+        for j in 0..n {
+            tau[j] = signals.tau[j][k] - alignment * signals.tau_rate[j][k];
+        }
+        plant.residual(&q, &v, &a, &tau, standstill, &mut rest);
+        for (row, &rest) in out.iter_mut().zip(&rest) {
+            row.push(rest);
+        }
+    }
+    out
+}

@@ -1,0 +1,439 @@
+//! The diagnosis: logs and a robot in; where, which and how far out.
+
+use crate::band::Band;
+use crate::corrected::{Corrected, EncoderSide, MODEL_SCHEMA, residual};
+use crate::estimate::Fit;
+use crate::evidence;
+use crate::floor::noise_floor;
+use crate::gap::{self, Rows};
+use crate::horizon::{self, Errors};
+use crate::problem::Problem;
+use crate::regimes::regimes;
+use crate::schema::*;
+use crate::select::{self, Choice, Rival};
+use crate::signals::{Signals, standstill};
+use crate::verdict;
+use gapscope_datasets::Episode;
+use gapscope_dynamics::Model;
+use gapscope_effects::{Candidate, Effect, EffectError, Kind, Plant};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// A rival as likely as this is named beside the choice.
+const WORTH_NAMING: f64 = 0.01;
+/// An effect whose best rival is as likely as this cannot be told from it.
+const INDISTINGUISHABLE: f64 = 0.05;
+/// A joint moves if this part of its samples is in motion, ...
+const MOVING_PART: f64 = 0.05;
+/// ... and its top speed is this many times the speed that counts as standing.
+const MOVING_SPEED: f64 = 8.0;
+/// Rounds of linearisation for effects whose torque is not linear in their parameters.
+const ROUNDS: usize = 5;
+/// Those effects: their torque bends with their own parameters or with those of others.
+const BENT: [Kind; 3] = [Kind::Payload, Kind::GravityMisalignment, Kind::TorqueGainError];
+
+/// Everything a diagnosis gives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The public answer.
+    pub diagnosis: Diagnosis,
+    /// What the report draws beside it.
+    pub evidence: Evidence,
+    /// The model with the effects found, for other logs.
+    pub corrected: Corrected,
+}
+
+/// Kinds that with many coefficients, or with one for all that a joint carries, can promise more than they keep.
+const INERTIAL: [Kind; 4] = [Kind::Payload, Kind::LinkInertiaError, Kind::GravityMisalignment, Kind::TorqueGainError];
+
+/// A stage of the work with the part of the whole that is done when it begins, 0 to 1.
+pub type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
+
+/// Diagnoses the gap between a robot's model and its logs. `findings` are what reading robot and logs brought up.
+///
+/// # Errors
+/// None that a log can cause; an [`EffectError`] would be a fault of this crate.
+pub fn diagnose(
+    model: &Model,
+    episodes: &[Episode],
+    mut findings: Vec<String>,
+    progress: Progress<'_>,
+) -> Result<Outcome, EffectError> {
+    progress("reading signals", 0.0);
+    let signals = signals(model, episodes, &mut findings);
+    let still = standstill(&signals, model.dof());
+    let moving = moving(&signals, &still, model, &mut findings);
+    let band = Band::new(&signals);
+    let data = DataSummary {
+        episodes: episodes.len(),
+        samples: episodes.iter().map(Episode::len).sum(),
+        duration: episodes.iter().map(Episode::duration).sum(),
+        rate: episodes.iter().map(Episode::rate).fold(0.0, f64::max),
+        band: band.cutoff,
+        findings,
+    };
+    let logs = Logs { model, signals, band, still, moving };
+    if !logs.is_excited() {
+        return Ok(logs.not_excited(data));
+    }
+    progress("signatures of every effect", 0.05);
+    let (problem, choice) = logs.choose(progress)?;
+    progress("rivals", 0.55);
+    let rivals = select::rivals(&problem, &choice);
+    logs.conclude(&problem, &choice, &rivals, data, progress)
+}
+
+/// Signals of every episode that is long enough.
+pub(crate) fn signals(model: &Model, episodes: &[Episode], findings: &mut Vec<String>) -> Vec<Signals> {
+    let all: Vec<Option<Signals>> = episodes.par_iter().map(|episode| Signals::new(model, episode)).collect();
+    for (episode, signals) in episodes.iter().zip(&all) {
+        if signals.is_none() {
+            findings.push(format!("{}: too short to use ({:.2} s)", episode.name, episode.duration()));
+        }
+    }
+    all.into_iter().flatten().collect()
+}
+
+/// Which joints move enough to tell anything.
+fn moving(signals: &[Signals], still: &[f64], model: &Model, findings: &mut Vec<String>) -> Vec<bool> {
+    model
+        .joints()
+        .iter()
+        .enumerate()
+        .map(|(j, joint)| {
+            let speeds = || signals.iter().flat_map(|s| s.v[j].iter()).map(|v| v.abs());
+            let in_motion = speeds().filter(|v| *v >= still[j]).count() as f64;
+            let moves = in_motion >= MOVING_PART * speeds().count() as f64
+                && in_motion > 0.0
+                && speeds().fold(0.0, f64::max) > MOVING_SPEED * still[j];
+            if !moves && !signals.is_empty() {
+                findings.push(format!("{}: hardly moves in these logs, so nothing is said about it", joint.name));
+            }
+            moves
+        })
+        .collect()
+}
+
+/// What is being compared.
+struct Logs<'a> {
+    model: &'a Model,
+    signals: Vec<Signals>,
+    band: Band,
+    still: Vec<f64>,
+    moving: Vec<bool>,
+}
+
+/// Held-out residuals and state errors of one model.
+struct HeldOut {
+    rows: Rows,
+    errors: Errors,
+}
+
+impl Logs<'_> {
+    fn is_excited(&self) -> bool {
+        self.moving.iter().any(|m| *m) && self.band.rows.len() >= verdict::LEAST_ROWS
+    }
+
+    /// The problem and the set of candidates chosen; again with the curvature of effects whose torque is not linear.
+    ///
+    /// What the normal equations promise is held against the torque that the plant really predicts on held-out data: a set
+    /// that makes the gap larger there is no explanation, and the next choice does without the kinds that bend.
+    fn choose(&self, progress: Progress<'_>) -> Result<(Problem, Choice), EffectError> {
+        let weights = gap::weights(&self.signals, &self.moving);
+        let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, |_| true)), &weights);
+        let before = rms(&self.nominal_rows());
+        let mut forbidden: &[Kind] = &[];
+        loop {
+            let (problem, choice) = self.choose_without(forbidden, progress)?;
+            if choice.set.is_empty() || rms(&self.held_out(&problem, &choice.set, false)?.rows) < before {
+                return Ok((problem, choice));
+            }
+            if !forbidden.is_empty() {
+                let none = select::evaluate(&problem, Vec::new());
+                return Ok((problem, none));
+            }
+            forbidden = &INERTIAL;
+        }
+    }
+
+    fn choose_without(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<(Problem, Choice), EffectError> {
+        let mut candidates = Candidate::all(self.model);
+        candidates.retain(|c| !forbidden.contains(&c.kind));
+        let residuals: Vec<Vec<Vec<f64>>> =
+            self.signals.iter().map(|s| residual(&mut Plant::nominal(self.model, s.dt), s, &self.still, 0.0)).collect();
+        let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof());
+        let mut problem =
+            Problem::new(self.model, &self.signals, &self.band, &self.still, &self.moving, candidates, &noise);
+        progress("choosing effects", 0.2);
+        let mut choice = select::choose(&problem, &[], &[]);
+        for round in 0..ROUNDS {
+            if !select::kinds(&problem, &choice.set).iter().any(|k| BENT.contains(k)) {
+                break;
+            }
+            progress("refining effects", 0.4 + 0.03 * round as f64);
+            let curvature = self.curvature(&problem, &Fit::on_all(&problem, &choice.set))?;
+            problem.bend(&self.signals, &self.band, &self.still, &curvature);
+            // The first rounds may still change the choice; the later ones only settle its parameters.
+            choice = if round < 2 {
+                select::choose(&problem, &choice.set, &[])
+            } else {
+                select::evaluate(&problem, choice.set)
+            };
+        }
+        Ok((problem, choice))
+    }
+
+    /// What the effects of a fit add to the residual beyond their linear signature: `[episode][joint][signal]`.
+    fn curvature(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
+        let effects = fit.effects(problem, self.model);
+        self.signals
+            .iter()
+            .map(|s| {
+                let mut exact = residual(&mut Plant::new(self.model, &effects, s.dt)?, s, &self.still, 0.0);
+                let nominal = residual(&mut Plant::nominal(self.model, s.dt), s, &self.still, 0.0);
+                let motion = s.motion(self.model, &self.still);
+                // exact = nominal − Σ θφ + curvature
+                for (x, n) in exact.iter_mut().zip(&nominal) {
+                    x.iter_mut().zip(n).for_each(|(x, n)| *x -= n);
+                }
+                for &c in &fit.set {
+                    let entry = &problem.entries[c];
+                    let theta = entry
+                        .columns
+                        .clone()
+                        .filter_map(|i| fit.columns.iter().position(|&column| column == i).map(|at| fit.theta[at]));
+                    for (column, theta) in entry.candidate.columns(&motion).iter().zip(theta) {
+                        for (j, torque) in &column.rows {
+                            exact[*j].iter_mut().zip(torque).for_each(|(x, t)| *x += theta * t);
+                        }
+                    }
+                }
+                Ok(exact)
+            })
+            .collect()
+    }
+
+    /// Residuals and state errors on each fold of the model fitted without that fold.
+    fn held_out(&self, problem: &Problem, set: &[usize], with_errors: bool) -> Result<HeldOut, EffectError> {
+        let fits: Vec<Fit> = (0..self.band.folds).map(|fold| Fit::without_fold(problem, set, fold)).collect();
+        let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
+        let n = self.model.dof();
+        let mut rows: Rows = vec![vec![0.0; self.band.rows.len()]; n];
+        for (e, s) in self.signals.iter().enumerate() {
+            let range = self.band.of_episode[e].clone();
+            for fold in 0..self.band.folds {
+                if !self.band.rows[range.clone()].iter().any(|r| r.fold == fold) {
+                    continue;
+                }
+                let mut plant = Plant::new(self.model, &effects[fold], s.dt)?;
+                let rest = residual(&mut plant, s, &self.still, fits[fold].alignment());
+                for (row, x) in rows.iter_mut().zip(&rest) {
+                    let filtered = self.band.filter(e, x);
+                    for (i, value) in range.clone().zip(filtered) {
+                        if self.band.rows[i].fold == fold {
+                            row[i] = value;
+                        }
+                    }
+                }
+            }
+        }
+        let mut steps = with_errors;
+        for effects in &effects {
+            steps &= horizon::can_step(&Plant::new(self.model, effects, 1e-3)?, &self.signals);
+        }
+        let errors = if steps {
+            horizon::errors(&self.signals, &self.band, n, |dt, fold| {
+                Plant::new(self.model, &effects[fold], dt).unwrap_or_else(|_| Plant::nominal(self.model, dt))
+            })
+        } else {
+            Errors::unknown()
+        };
+        Ok(HeldOut { rows, errors })
+    }
+
+    fn nominal(&self) -> HeldOut {
+        HeldOut {
+            rows: self.nominal_rows(),
+            errors: horizon::errors_of(&self.signals, &self.band, self.model, |dt| Plant::nominal(self.model, dt)),
+        }
+    }
+
+    fn nominal_rows(&self) -> Rows {
+        let residuals: Vec<Vec<Vec<f64>>> = self
+            .signals
+            .par_iter()
+            .map(|s| residual(&mut Plant::nominal(self.model, s.dt), s, &self.still, 0.0))
+            .collect();
+        gap::at_rows(&self.band, &residuals, self.model.dof())
+    }
+
+    fn conclude(
+        &self,
+        problem: &Problem,
+        choice: &Choice,
+        rivals: &[Rival],
+        data: DataSummary,
+        progress: Progress<'_>,
+    ) -> Result<Outcome, EffectError> {
+        let model = self.model;
+        let weights = gap::weights(&self.signals, &self.moving);
+        let fit = Fit::on_all(problem, &choice.set);
+        let effects = fit.effects(problem, model);
+        progress("held-out rollouts", 0.7);
+        let before = self.nominal();
+        let after = self.held_out(problem, &choice.set, true)?;
+        let final_residuals: Vec<Vec<Vec<f64>>> = self
+            .signals
+            .iter()
+            .map(|s| Ok(residual(&mut Plant::new(model, &effects, s.dt)?, s, &self.still, fit.alignment())))
+            .collect::<Result<_, EffectError>>()?;
+        let floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof());
+        progress("intervals", 0.85);
+        let everything = |_: usize| true;
+        let squares = |rows: &Rows| gap::squares(&self.band, rows, everything);
+        let floor_rms = gap::weighted_rms(&floor.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &weights);
+        let torque = gap::change(&squares(&before.rows), &squares(&after.rows), &weights, floor_rms);
+        let (one_step, rollout) = before.errors.change(&after.errors, &weights);
+        let unexplained = verdict::unexplained_fraction(&torque, floor_rms);
+        let verdict = verdict::verdict(&effects, &torque, floor_rms, unexplained);
+        let found = self.found_effects(problem, &fit, rivals, &torque, &weights)?;
+        let corrected = Corrected {
+            schema: MODEL_SCHEMA.to_owned(),
+            robot: model.name().to_owned(),
+            weights: gap::by_joint(model, weights.iter().copied()),
+            standstill: gap::by_joint(model, self.still.iter().copied()),
+            band: self.band.cutoff,
+            encoder_side: EncoderSide::Link,
+            alignment: fit.alignment(),
+            effects,
+        };
+        let gap_of = |held_out: &HeldOut| Gap {
+            torque: gap::torque_gap(model, &self.band, &held_out.rows, &floor, everything),
+            one_step: held_out.errors.state_gap(model),
+            rollout: held_out.errors.rollout_gaps(model),
+            regimes: regimes(model, &self.signals, &self.band, &self.still, &held_out.rows),
+        };
+        let remaining = gap_of(&after);
+        let mut evidence =
+            evidence::evidence(model, &self.signals, &self.band, &self.still, problem, &fit, &before.rows, &after.rows);
+        let left = remaining.regimes.clone();
+        evidence.remaining = (!found.is_empty()).then_some(remaining);
+        let diagnosis = Diagnosis {
+            schema: DIAGNOSIS_SCHEMA.to_owned(),
+            robot: model.name().to_owned(),
+            joints: model.joints().iter().map(|j| j.name.clone()).collect(),
+            data,
+            verdict,
+            gap: gap_of(&before),
+            next_experiment: verdict::next_experiment(&found),
+            effects: found,
+            alternatives: alternatives(problem, rivals),
+            unexplained: Unexplained { fraction: unexplained, regimes: left },
+            shrink: Shrink {
+                torque,
+                one_step,
+                rollout,
+                reference: Reference { noise_floor: floor_rms, residual_network: None, pure_network: None },
+            },
+        };
+        progress("done", 1.0);
+        Ok(Outcome { diagnosis, evidence, corrected })
+    }
+
+    fn found_effects(
+        &self,
+        problem: &Problem,
+        fit: &Fit,
+        rivals: &[Rival],
+        torque: &Change,
+        weights: &[f64],
+    ) -> Result<Vec<FoundEffect>, EffectError> {
+        let chosen = select::kinds(problem, &fit.set);
+        let mut found = Vec::new();
+        for (effect, own) in fit.effects_with_candidates(problem, self.model) {
+            let kind = effect.kind();
+            let alone = self.held_out(problem, &own, false)?;
+            let sums = gap::total(&gap::squares(&self.band, &alone.rows, |_| true));
+            let shrink =
+                torque.shrink.zip(torque.before).map(|(_, before)| 1.0 - gap::weighted_rms(&sums, weights) / before);
+            let rival = rivals.iter().find(|r| r.without == kind);
+            let confused = rival.filter(|r| r.probability > INDISTINGUISHABLE).map_or_else(Vec::new, |r| {
+                select::kinds(problem, &r.choice.set)
+                    .into_iter()
+                    .filter(|k| !chosen.contains(k))
+                    .map(|k| k.name().to_owned())
+                    .collect()
+            });
+            let loss = rival.map_or(0.0, |r| r.choice.blocks.iter().sum::<f64>());
+            found.push((
+                loss,
+                FoundEffect {
+                    kind: kind.name().to_owned(),
+                    joints: effect.law().joints(),
+                    confidence: 1.0 - rival.map_or(0.0, |r| r.probability),
+                    parameters: fit.parameters(problem, self.model, &own),
+                    indistinguishable_from: confused,
+                    shrink: EffectShrink { torque: shrink },
+                },
+            ));
+        }
+        // Strongest first: by what the best explanation without it leaves.
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        Ok(found.into_iter().map(|(_, effect)| effect).collect())
+    }
+
+    /// The answer where the logs are too still or too short.
+    fn not_excited(&self, data: DataSummary) -> Outcome {
+        let model = self.model;
+        let nothing = || Change { before: Some(0.0), after: Some(0.0), shrink: None, ci95: None };
+        let zero: PerJoint = gap::by_joint(model, std::iter::repeat_n(0.0, model.dof()));
+        let diagnosis = Diagnosis {
+            schema: DIAGNOSIS_SCHEMA.to_owned(),
+            robot: model.name().to_owned(),
+            joints: model.joints().iter().map(|j| j.name.clone()).collect(),
+            data,
+            verdict: Verdict::NotExcited,
+            gap: Gap {
+                torque: TorqueGap { rms: zero.clone(), floor: zero.clone(), ci95: BTreeMap::new() },
+                one_step: StateGap { position: zero.clone(), velocity: zero.clone() },
+                rollout: Vec::new(),
+                regimes: Vec::new(),
+            },
+            effects: Vec::new(),
+            alternatives: Vec::new(),
+            unexplained: Unexplained { fraction: 0.0, regimes: Vec::new() },
+            shrink: Shrink {
+                torque: nothing(),
+                one_step: nothing(),
+                rollout: Vec::new(),
+                reference: Reference { noise_floor: 0.0, residual_network: None, pure_network: None },
+            },
+            next_experiment: Some(verdict::motion_to_excite()),
+        };
+        let corrected = Corrected {
+            schema: MODEL_SCHEMA.to_owned(),
+            robot: model.name().to_owned(),
+            weights: zero.clone(),
+            standstill: gap::by_joint(model, self.still.iter().copied()),
+            band: if self.band.cutoff.is_finite() { self.band.cutoff } else { 1.0 },
+            encoder_side: EncoderSide::Link,
+            alignment: 0.0,
+            effects: Vec::new(),
+        };
+        Outcome { diagnosis, evidence: Evidence::default(), corrected }
+    }
+}
+
+fn alternatives(problem: &Problem, rivals: &[Rival]) -> Vec<Alternative> {
+    let mut all: Vec<Alternative> = rivals
+        .iter()
+        .filter(|r| r.probability > WORTH_NAMING)
+        .map(|r| Alternative {
+            effects: select::kinds(problem, &r.choice.set).iter().map(|k| k.name().to_owned()).collect(),
+            probability: r.probability,
+        })
+        .collect();
+    all.sort_by(|a, b| b.probability.total_cmp(&a.probability).then_with(|| a.effects.cmp(&b.effects)));
+    all.dedup_by(|a, b| a.effects == b.effects);
+    all
+}

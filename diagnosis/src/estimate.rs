@@ -1,0 +1,152 @@
+//! From coefficients to effects with parameters and intervals.
+
+use crate::problem::Problem;
+use crate::schema::{Estimate, Parameter, Quantity};
+use gapscope_dynamics::{JointKind, Model};
+use gapscope_effects::{Effect, Value};
+use nalgebra::DMatrix;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::collections::BTreeMap;
+
+/// Step of the numerical derivative from coefficients to parameters, in standard errors.
+const STEP: f64 = 1e-3;
+
+/// A model in coefficients: a set of candidates fitted to some rows.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Indices of candidates.
+    pub set: Vec<usize>,
+    /// Columns of the problem, the alignment first.
+    pub columns: Vec<usize>,
+    /// Their coefficients.
+    pub theta: Vec<f64>,
+}
+
+impl Fit {
+    /// Fit on all rows.
+    pub fn on_all(problem: &Problem, set: &[usize]) -> Fit {
+        let columns = problem.columns(set);
+        let theta = problem.fit(&columns);
+        Fit { set: set.to_vec(), columns, theta }
+    }
+
+    /// Fit on all rows outside a fold.
+    pub fn without_fold(problem: &Problem, set: &[usize], fold: usize) -> Fit {
+        let columns = problem.columns(set);
+        let theta = problem.fit_without(&columns, fold);
+        Fit { set: set.to_vec(), columns, theta }
+    }
+
+    /// Time by which the logged effort acts late against the position, s.
+    pub fn alignment(&self) -> f64 {
+        // Without effects there is nothing to correct, and the nominal model stays as it is.
+        if self.set.is_empty() { 0.0 } else { self.theta.first().copied().unwrap_or(0.0) }
+    }
+
+    /// Position in `columns` of a candidate's own columns, and their coefficients.
+    fn own(&self, problem: &Problem, candidate: usize) -> (Vec<usize>, Vec<f64>) {
+        let range = problem.entries[candidate].columns.clone();
+        self.columns
+            .iter()
+            .zip(&self.theta)
+            .enumerate()
+            .filter(|(_, (c, _))| range.contains(c))
+            .map(|(i, (_, t))| (i, *t))
+            .unzip()
+    }
+
+    /// The effects, one a kind where the kind has a value per joint. Candidates whose coefficients no physical effect has are left out.
+    pub fn effects(&self, problem: &Problem, model: &Model) -> Vec<Effect> {
+        self.effects_with_candidates(problem, model).into_iter().map(|(effect, _)| effect).collect()
+    }
+
+    /// The effects, each with the candidates that it is made of.
+    pub fn effects_with_candidates(&self, problem: &Problem, model: &Model) -> Vec<(Effect, Vec<usize>)> {
+        let mut effects: Vec<(Effect, Vec<usize>)> = Vec::new();
+        for &c in &self.set {
+            let (_, theta) = self.own(problem, c);
+            let Some(effect) = problem.entries[c].candidate.effect(model, &theta) else { continue };
+            let apart = effects
+                .iter_mut()
+                .try_fold(effect, |effect, (known, made_of)| known.absorb(effect).ok_or_else(|| made_of.push(c)));
+            // An error says that a known effect of the same kind has taken it in.
+            effects.extend(apart.ok().map(|effect| (effect, vec![c])));
+        }
+        effects
+    }
+
+    /// Parameters of an effect made of some candidates under their public names, with 95 % intervals by the delta method.
+    pub fn parameters(&self, problem: &Problem, model: &Model, candidates: &[usize]) -> BTreeMap<String, Parameter> {
+        let covariance = problem.covariance(&self.columns, &self.theta);
+        let quantile = StudentsT::new(0.0, 1.0, problem.blocks_used().saturating_sub(1).max(1) as f64)
+            .map_or(1.96, |t| t.inverse_cdf(0.975));
+        let mut parameters: BTreeMap<String, Parameter> = BTreeMap::new();
+        for &c in candidates {
+            let (at, theta) = self.own(problem, c);
+            let own = DMatrix::from_fn(at.len(), at.len(), |i, k| covariance[(at[i], at[k])]);
+            let values = |theta: &[f64]| -> Option<Vec<Value>> {
+                Some(problem.entries[c].candidate.effect(model, theta)?.law().parameters())
+            };
+            let Some(estimates) = values(&theta) else { continue };
+            let slopes: Vec<Option<(f64, Vec<Value>)>> = (0..theta.len())
+                .map(|i| {
+                    let step = STEP * own[(i, i)].sqrt();
+                    let mut moved = theta.clone();
+                    moved[i] += step;
+                    (step.is_finite() && step > 0.0).then_some(())?;
+                    Some((step, values(&moved)?))
+                })
+                .collect();
+            for (v, estimate) in estimates.iter().enumerate() {
+                let half: Vec<f64> = (0..estimate.value.len())
+                    .map(|component| {
+                        let gradient: Vec<f64> = slopes
+                            .iter()
+                            .map(|slope| {
+                                slope.as_ref().map_or(0.0, |(step, moved)| {
+                                    (moved[v].value[component] - estimate.value[component]) / step
+                                })
+                            })
+                            .collect();
+                        let variance: f64 = (0..at.len())
+                            .flat_map(|i| (0..at.len()).map(move |k| (i, k)))
+                            .map(|(i, k)| gradient[i] * own[(i, k)] * gradient[k])
+                            .sum();
+                        quantile * variance.max(0.0).sqrt()
+                    })
+                    .collect();
+                insert(&mut parameters, model, estimate, &half);
+            }
+        }
+        parameters
+    }
+}
+
+fn insert(parameters: &mut BTreeMap<String, Parameter>, model: &Model, value: &Value, half: &[f64]) {
+    let quantity = |values: Vec<f64>| match values.as_slice() {
+        &[one] => Quantity::Scalar(one),
+        _ => Quantity::Vector(values),
+    };
+    let shifted = |sign: f64| quantity(value.value.iter().zip(half).map(|(v, h)| v + sign * h).collect());
+    let prismatic = value
+        .joint
+        .as_deref()
+        .and_then(|name| model.joint_index(name))
+        .is_some_and(|j| model.joints()[j].kind == JointKind::Prismatic);
+    let estimate = Estimate {
+        value: quantity(value.value.clone()),
+        ci95: [shifted(-1.0), shifted(1.0)],
+        unit: if prismatic { value.unit_prismatic } else { value.unit }.to_owned(),
+    };
+    match &value.joint {
+        None => {
+            parameters.insert(value.name.to_owned(), Parameter::Single(estimate));
+        }
+        Some(joint) => {
+            let entry = parameters.entry(value.name.to_owned()).or_insert_with(|| Parameter::PerJoint(BTreeMap::new()));
+            if let Parameter::PerJoint(map) = entry {
+                map.insert(joint.clone(), estimate);
+            }
+        }
+    }
+}

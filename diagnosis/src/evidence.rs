@@ -1,0 +1,135 @@
+//! What the report draws: torque over time, and each effect's law with the data behind it.
+
+use crate::band::Band;
+use crate::estimate::Fit;
+use crate::gap::Rows;
+use crate::problem::Problem;
+use crate::schema::{EffectCurve, Evidence, TorqueSeries};
+use crate::signals::Signals;
+use gapscope_dynamics::{JointKind, Model};
+use gapscope_effects::Kind;
+use std::collections::BTreeMap;
+
+/// The signal on the horizontal axis of a curve, joint-major.
+type Pick = fn(&Signals) -> &Vec<Vec<f64>>;
+
+/// Points of a curve's data, at most.
+const POINTS: usize = 1200;
+
+/// Series and curves from the residuals before and after (`[joint][row]`).
+#[expect(clippy::too_many_arguments, reason = "it reads every stage's result; a struct would only rename them")]
+pub fn evidence(
+    model: &Model,
+    signals: &[Signals],
+    band: &Band,
+    standstill: &[f64],
+    problem: &Problem,
+    fit: &Fit,
+    before: &Rows,
+    after: &Rows,
+) -> Evidence {
+    let of_rows = |signal: &dyn Fn(&Signals) -> Vec<f64>| -> Vec<f64> {
+        signals.iter().enumerate().flat_map(|(e, s)| band.filter(e, &signal(s))).collect()
+    };
+    let unit = |j: usize| if model.joints()[j].kind == JointKind::Prismatic { "N" } else { "N m" };
+    let breaks: Vec<usize> = band.of_episode.iter().skip(1).map(|r| r.start).collect();
+    let mut time = Vec::with_capacity(band.rows.len());
+    let mut offset = 0.0;
+    for (e, s) in signals.iter().enumerate() {
+        time.extend(band.rows[band.of_episode[e].clone()].iter().map(|r| offset + r.center as f64 * s.dt));
+        offset += s.len() as f64 * s.dt;
+    }
+    let torque = model
+        .joints()
+        .iter()
+        .enumerate()
+        .map(|(j, joint)| {
+            let measured = of_rows(&|s| s.tau[j].clone());
+            let less = |rest: &[f64]| measured.iter().zip(rest).map(|(m, r)| m - r).collect();
+            TorqueSeries {
+                joint: joint.name.clone(),
+                unit: unit(j).into(),
+                time: time.clone(),
+                nominal: less(&before[j]),
+                corrected: less(&after[j]),
+                measured,
+                breaks: breaks.clone(),
+            }
+        })
+        .collect();
+    Evidence { torque, curves: curves(model, signals, band, standstill, problem, fit, after), ..Evidence::default() }
+}
+
+fn curves(
+    model: &Model,
+    signals: &[Signals],
+    band: &Band,
+    standstill: &[f64],
+    problem: &Problem,
+    fit: &Fit,
+    after: &Rows,
+) -> Vec<EffectCurve> {
+    // What each kind adds to each joint, at the rows.
+    let mut parts: BTreeMap<(Kind, usize), Vec<f64>> = BTreeMap::new();
+    for &c in &fit.set {
+        let entry = &problem.entries[c];
+        let theta: Vec<f64> = fit
+            .columns
+            .iter()
+            .zip(&fit.theta)
+            .filter(|(column, _)| entry.columns.contains(column))
+            .map(|(_, t)| *t)
+            .collect();
+        for (e, s) in signals.iter().enumerate() {
+            let columns = entry.candidate.columns(&s.motion(model, standstill));
+            for (column, theta) in columns.iter().zip(&theta) {
+                for (j, torque) in &column.rows {
+                    let sum = parts.entry((entry.candidate.kind, *j)).or_insert_with(|| vec![0.0; band.rows.len()]);
+                    for (i, x) in band.of_episode[e].clone().zip(band.filter(e, torque)) {
+                        sum[i] += theta * x;
+                    }
+                }
+            }
+        }
+    }
+    let size = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>();
+    let mut ordered: Vec<((Kind, usize), Vec<f64>)> = parts.into_iter().filter(|(_, p)| size(p) > 0.0).collect();
+    ordered.sort_by(|a, b| {
+        (size(&b.1) / problem.scale[b.0.1].powi(2)).total_cmp(&(size(&a.1) / problem.scale[a.0.1].powi(2)))
+    });
+    ordered
+        .into_iter()
+        .map(|((kind, j), part)| {
+            let prismatic = model.joints()[j].kind == JointKind::Prismatic;
+            let (label, signal): (&str, Option<Pick>) = match (kind, prismatic) {
+                (Kind::ViscousFriction | Kind::CoulombFriction, false) => ("speed, rad/s", Some(|s| &s.v)),
+                (Kind::ViscousFriction | Kind::CoulombFriction, true) => ("speed, m/s", Some(|s| &s.v)),
+                (Kind::Armature, false) => ("acceleration, rad/s²", Some(|s| &s.a)),
+                (Kind::Armature, true) => ("acceleration, m/s²", Some(|s| &s.a)),
+                (Kind::ParallelSpring | Kind::TorqueBias, false) => ("position, rad", Some(|s| &s.q)),
+                (Kind::ParallelSpring | Kind::TorqueBias, true) => ("position, m", Some(|s| &s.q)),
+                (Kind::TorqueGainError, false) => ("logged effort, N m", Some(|s| &s.tau)),
+                (Kind::TorqueGainError, true) => ("logged effort, N", Some(|s| &s.tau)),
+                // Effects of many variables are drawn against their own prediction.
+                (_, false) => ("predicted, N m", None),
+                (_, true) => ("predicted, N", None),
+            };
+            let x: Vec<f64> = match signal {
+                Some(signal) => signals.iter().enumerate().flat_map(|(e, s)| band.filter(e, &signal(s)[j])).collect(),
+                None => part.clone(),
+            };
+            let thin = x.len().div_ceil(POINTS).max(1);
+            let data = (0..x.len()).step_by(thin).map(|i| [x[i], part[i] + after[j][i]]).collect();
+            let mut law: Vec<[f64; 2]> = x.iter().zip(&part).step_by(thin).map(|(x, y)| [*x, *y]).collect();
+            law.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            EffectCurve {
+                kind: kind.name().into(),
+                joint: model.joints()[j].name.clone(),
+                x_label: label.into(),
+                unit: if prismatic { "N" } else { "N m" }.into(),
+                data,
+                law,
+            }
+        })
+        .collect()
+}

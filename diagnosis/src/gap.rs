@@ -1,0 +1,111 @@
+//! Where the gap lies, and how far it shrinks: figures of residuals at the rows of the band, on held-out data.
+
+use crate::band::Band;
+use crate::bootstrap::interval;
+use crate::schema::{Change, PerJoint, TorqueGap};
+use crate::signals::Signals;
+use gapscope_dynamics::Model;
+use std::collections::BTreeMap;
+
+/// Residual torque at the rows of the band: `[joint][row]`, N m or N.
+pub type Rows = Vec<Vec<f64>>;
+
+/// Residuals of every episode, each `[joint][signal]`, at the rows of the band.
+pub fn at_rows(band: &Band, residuals: &[Vec<Vec<f64>>], joints: usize) -> Rows {
+    let mut rows = vec![Vec::with_capacity(band.rows.len()); joints];
+    for (episode, residual) in residuals.iter().enumerate() {
+        for (row, x) in rows.iter_mut().zip(residual) {
+            row.extend(band.filter(episode, x));
+        }
+    }
+    rows
+}
+
+/// Weight of each joint in overall torque figures: one over the standard deviation of its effort, 0 where it did not move.
+pub fn weights(signals: &[Signals], moving: &[bool]) -> Vec<f64> {
+    moving
+        .iter()
+        .enumerate()
+        .map(|(j, &moves)| {
+            let all = || signals.iter().flat_map(|s| s.tau[j].iter());
+            let count = all().count().max(1) as f64;
+            let mean = all().sum::<f64>() / count;
+            let deviation = (all().map(|t| (t - mean).powi(2)).sum::<f64>() / count).sqrt();
+            if moves && deviation > 0.0 { 1.0 / deviation } else { 0.0 }
+        })
+        .collect()
+}
+
+/// Sums of squares per block and joint: `[block][joint]`, and the count of rows behind them as last entry. Blocks without a row are left out.
+pub fn squares(band: &Band, rows: &Rows, keep: impl Fn(usize) -> bool) -> Vec<Vec<f64>> {
+    let mut sums = vec![vec![0.0; rows.len() + 1]; band.blocks];
+    for (i, row) in band.rows.iter().enumerate().filter(|(i, _)| keep(*i)) {
+        for (j, joint) in rows.iter().enumerate() {
+            sums[row.block][j] += joint[i] * joint[i];
+        }
+        sums[row.block][rows.len()] += 1.0;
+    }
+    sums.retain(|s| s[rows.len()] > 0.0);
+    sums
+}
+
+/// Adds up blocks.
+pub fn total(blocks: &[Vec<f64>]) -> Vec<f64> {
+    let mut sum = vec![0.0; blocks.first().map_or(0, Vec::len)];
+    for block in blocks {
+        sum.iter_mut().zip(block).for_each(|(s, x)| *s += x);
+    }
+    sum
+}
+
+/// sqrt(mean_j (w_j rms_j)²) over the joints with weight, from sums of squares with the count last.
+pub fn weighted_rms(sums: &[f64], weights: &[f64]) -> f64 {
+    let count = sums.last().copied().unwrap_or(0.0).max(1.0);
+    let used = weights.iter().filter(|w| **w > 0.0).count().max(1) as f64;
+    (weights.iter().zip(sums).map(|(w, s)| w * w * s / count).sum::<f64>() / used).sqrt()
+}
+
+/// A figure for each joint by name.
+pub fn by_joint(model: &Model, values: impl IntoIterator<Item = f64>) -> PerJoint {
+    model.joints().iter().map(|j| j.name.clone()).zip(values).collect()
+}
+
+/// Torque gap per joint with intervals.
+pub fn torque_gap(model: &Model, band: &Band, rows: &Rows, floor: &[f64], keep: impl Fn(usize) -> bool) -> TorqueGap {
+    let n = model.dof();
+    let blocks = squares(band, rows, keep);
+    let sums = total(&blocks);
+    let rms = |sums: &[f64], j: usize| (sums[j] / sums[n].max(1.0)).sqrt();
+    let ci95: BTreeMap<String, [f64; 2]> = model
+        .joints()
+        .iter()
+        .enumerate()
+        .filter_map(|(j, joint)| Some((joint.name.clone(), interval(&blocks, |s| Some(rms(s, j)))?)))
+        .collect();
+    let values = (0..n).map(|j| if sums.is_empty() { 0.0 } else { rms(&sums, j) });
+    TorqueGap { rms: by_joint(model, values), floor: by_joint(model, floor.iter().copied()), ci95 }
+}
+
+/// Overall change of a gap from paired blocks of sums of squares (count last).
+/// `floor` is what noise alone gives: no shrink is claimed where `before` is not above it.
+pub fn change(before: &[Vec<f64>], after: &[Vec<f64>], weights: &[f64], floor: f64) -> Change {
+    let shrink = |sums: &[f64]| {
+        let (before, after) = sums.split_at(sums.len() / 2);
+        let before = weighted_rms(before, weights);
+        (before > 0.0).then(|| 1.0 - weighted_rms(after, weights) / before)
+    };
+    let pairs: Vec<Vec<f64>> = before.iter().zip(after).map(|(b, a)| [b.as_slice(), a].concat()).collect();
+    let sums = total(&pairs);
+    let (b, a) = sums.split_at(sums.len() / 2);
+    let (b, a) = (weighted_rms(b, weights), weighted_rms(a, weights));
+    let claimed = b > AT_FLOOR * floor;
+    Change {
+        before: Some(b),
+        after: Some(a),
+        shrink: if claimed { shrink(&sums) } else { None },
+        ci95: if claimed { interval(&pairs, shrink) } else { None },
+    }
+}
+
+/// A gap below this multiple of the floor is at the floor: below one, because the floor is an estimate itself.
+const AT_FLOOR: f64 = 0.8;

@@ -1,0 +1,29 @@
+//! The gap between a robot's model and the robot: where it lies, which unmodelled effects cause it, and how far it shrinks
+//! once they are added, on held-out data.
+//!
+//! [`diagnose`] goes from logs to an [`Outcome`]; [`evaluate`] puts a [`Corrected`] model on other logs. Stages, each in a
+//! file: `signals` (smoothed, consistent), `band` (rows to compare), `problem` (least squares over all candidates),
+//! `select` (which), `estimate` (parameters), `gap`, `regimes`, `horizon` (where and how far), `floor`, `verdict`.
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod band;
+mod bootstrap;
+mod corrected;
+mod diagnose;
+mod estimate;
+mod evaluate;
+mod evidence;
+mod floor;
+mod gap;
+mod horizon;
+mod kernel;
+mod problem;
+mod regimes;
+pub mod schema;
+mod select;
+mod signals;
+mod verdict;
+
+pub use corrected::{Corrected, CorrectedError, EncoderSide, MODEL_SCHEMA};
+pub use diagnose::{Outcome, Progress, diagnose};
+pub use evaluate::{Predictions, evaluate};

@@ -1,0 +1,486 @@
+//! The least-squares problem behind the choice of effects, kept as normal equations per block, so that any subset of
+//! candidates is fitted, held out and resampled in microseconds.
+
+use crate::band::Band;
+use crate::signals::Signals;
+use gapscope_dynamics::Model;
+use gapscope_effects::{Candidate, Column};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Residuals beyond this many standard deviations get less weight (Huber 1964).
+const HUBER: f64 = 3.0;
+/// Errors under this part of a joint's effort are nobody's concern: they are what sampling and integration leave.
+const IMMATERIAL: f64 = 1e-3;
+/// An effect must move some joint by this multiple of the immaterial part of its effort, ...
+const MATERIAL: f64 = 3.0;
+/// ... by this part of the noise, which many rows average out, and by all of what no candidate explains beyond the noise,
+/// which no number of rows averages out: with unknown effects of that size about, a smaller one cannot be named.
+const OF_NOISE: f64 = 0.2;
+/// Eigenvalues of a candidate's normal equations below this part of the largest count as zero.
+const RANK_TOLERANCE: f64 = 1e-6;
+/// Relative ridge that keeps the normal equations regular.
+const RIDGE: f64 = 1e-9;
+
+/// One candidate with the columns that it owns in the problem.
+#[derive(Debug, Clone)]
+pub struct Entry {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// Its columns.
+    pub columns: Range<usize>,
+    /// How many of its coefficients these logs can tell apart at all.
+    pub rank: usize,
+}
+
+/// Rows of one joint: filtered columns and target.
+#[derive(Debug, Clone)]
+struct JointRows {
+    /// Columns of the problem that touch this joint.
+    columns: Vec<usize>,
+    /// Index into the band's rows.
+    rows: Vec<usize>,
+    /// Row-major values, `rows × columns`.
+    values: Vec<f64>,
+    target: Vec<f64>,
+    /// The target before any bending.
+    linear_target: Vec<f64>,
+    /// Robust weight of each row.
+    robust: Vec<f64>,
+}
+
+/// Normal equations of one block.
+#[derive(Debug, Clone)]
+struct Normal {
+    gram: DMatrix<f64>,
+    moment: DVector<f64>,
+    square: f64,
+}
+
+impl Normal {
+    fn zeros(p: usize) -> Normal {
+        Normal { gram: DMatrix::zeros(p, p), moment: DVector::zeros(p), square: 0.0 }
+    }
+
+    fn add(&mut self, other: &Normal) {
+        self.gram += &other.gram;
+        self.moment += &other.moment;
+        self.square += other.square;
+    }
+
+    /// ‖y − Xθ‖² for coefficients on some columns.
+    fn deviance(&self, columns: &[usize], theta: &[f64]) -> f64 {
+        let mut sum = self.square;
+        for (i, &ci) in columns.iter().enumerate() {
+            let gi: f64 = columns.iter().zip(theta).map(|(&cj, t)| self.gram[(ci, cj)] * t).sum();
+            sum += theta[i] * (gi - 2.0 * self.moment[ci]);
+        }
+        sum
+    }
+}
+
+/// The problem: all candidates on all rows of a data set.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// Candidates and their columns. Column 0 is the alignment of effort and position and belongs to none.
+    pub entries: Vec<Entry>,
+    /// Least and greatest value of each coefficient.
+    pub bounds: Vec<(f64, f64)>,
+    /// Typical effort of each joint, N m or N.
+    pub scale: Vec<f64>,
+    /// Standard deviation of what no candidate explains, N m or N, with the immaterial part as its least value.
+    pub sigma: Vec<f64>,
+    /// Least root mean square torque by which an effect must move a joint to be named on its account, N m or N.
+    pub least: Vec<f64>,
+    /// Rows of each joint that count as one independent row.
+    correlation: Vec<f64>,
+    joints: Vec<JointRows>,
+    fold_of_block: Vec<usize>,
+    folds: usize,
+    blocks: Vec<Normal>,
+    training: Vec<Normal>,
+    total: Normal,
+}
+
+impl Problem {
+    /// Sets up the problem: signatures of every candidate on every episode, filtered; weights from a fit of all of them.
+    /// `noise` is the noise floor of each joint, N m or N.
+    pub fn new(
+        model: &Model,
+        signals: &[Signals],
+        band: &Band,
+        standstill: &[f64],
+        moving: &[bool],
+        candidates: Vec<Candidate>,
+        noise: &[f64],
+    ) -> Problem {
+        let n = model.dof();
+        let candidates: Vec<Candidate> =
+            candidates.into_iter().filter(|c| c.joints.iter().all(|&j| moving[j]) || c.joints.is_empty()).collect();
+        let half_sample = 0.5 * signals.iter().map(|s| s.raw.dt).fold(f64::INFINITY, f64::min);
+        let mut entries = Vec::new();
+        let mut bounds = vec![(-half_sample, half_sample)];
+        let mut joints: Vec<JointRows> = (0..n)
+            .map(|_| JointRows {
+                columns: vec![],
+                rows: vec![],
+                values: vec![],
+                target: vec![],
+                linear_target: vec![],
+                robust: vec![],
+            })
+            .collect();
+        for (e, s) in signals.iter().enumerate() {
+            let motion = s.motion(model, standstill);
+            let alignment = Column {
+                rows: (0..n).map(|j| (j, s.tau_rate[j].clone())).collect(),
+                at_least: -half_sample,
+                at_most: half_sample,
+            };
+            let columns: Vec<Vec<Column>> = candidates.par_iter().map(|c| c.columns(&motion)).collect();
+            if e == 0 {
+                for (candidate, columns) in candidates.iter().zip(&columns) {
+                    let begin = bounds.len();
+                    bounds.extend(columns.iter().map(|c| (c.at_least, c.at_most)));
+                    entries.push(Entry { candidate: candidate.clone(), columns: begin..bounds.len(), rank: 0 });
+                }
+                let all = std::iter::once(&alignment).chain(columns.iter().flatten());
+                for (index, column) in all.enumerate() {
+                    for (j, _) in &column.rows {
+                        joints[*j].columns.push(index);
+                    }
+                }
+            }
+            joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
+                if !moving[j] {
+                    return;
+                }
+                let counts: Vec<bool> = s.v[j].iter().map(|v| v.abs() >= standstill[j]).collect();
+                let residual: Vec<f64> =
+                    s.tau[j].iter().zip(&s.nominal[j]).map(|(tau, nominal)| tau - nominal).collect();
+                let target = band.filter_where(e, &counts, &residual);
+                let filtered: Vec<Vec<Option<f64>>> = std::iter::once(&alignment)
+                    .chain(columns.iter().flatten())
+                    .flat_map(|c| c.rows.iter().filter(|(row, _)| *row == j))
+                    .map(|(_, x)| band.filter_where(e, &counts, x))
+                    .collect();
+                for (i, row) in band.of_episode[e].clone().enumerate() {
+                    let Some(target) = target[i] else { continue };
+                    if !band.rows[row].fits {
+                        continue;
+                    }
+                    rows.rows.push(row);
+                    rows.linear_target.push(target);
+                    rows.target.push(target);
+                    rows.robust.push(1.0);
+                    rows.values.extend(filtered.iter().map(|x| x[i].unwrap_or(0.0)));
+                }
+            });
+        }
+        let scale = (0..n)
+            .map(|j| {
+                let (sum, count) = signals.iter().fold((0.0, 0usize), |(sum, count), s| {
+                    (sum + s.tau[j].iter().map(|t| t * t).sum::<f64>(), count + s.len())
+                });
+                (sum / count.max(1) as f64).sqrt().max(1e-9)
+            })
+            .collect();
+        let p = bounds.len();
+        let mut fold_of_block = vec![0; band.blocks];
+        for row in &band.rows {
+            fold_of_block[row.block] = row.fold;
+        }
+        let mut problem = Problem {
+            entries,
+            bounds,
+            scale,
+            sigma: vec![1.0; n],
+            least: vec![0.0; n],
+            correlation: vec![1.0; n],
+            joints,
+            fold_of_block,
+            folds: band.folds,
+            blocks: Vec::new(),
+            training: Vec::new(),
+            total: Normal::zeros(p),
+        };
+        problem.weigh(band);
+        for entry in &mut problem.entries {
+            entry.rank = rank(&problem.total.gram, &entry.columns);
+        }
+        problem.least = (0..n)
+            .map(|j| {
+                let misfit = (problem.sigma[j].powi(2) - noise[j].powi(2)).max(0.0).sqrt();
+                (OF_NOISE * noise[j]).max(misfit).max(MATERIAL * IMMATERIAL * problem.scale[j])
+            })
+            .collect();
+        problem
+    }
+
+    /// Rows that count as independent, all joints together; two at least.
+    pub fn effective_rows(&self) -> f64 {
+        self.joints.iter().zip(&self.correlation).map(|(j, c)| j.rows.len() as f64 / c).sum::<f64>().max(2.0)
+    }
+
+    /// Adds to the target what effects that were found add to the residual beyond their linear signature
+    /// (`[episode][joint][signal]`, from the unbent problem), so that fitting again finds them exactly: a chord method.
+    pub fn bend(&mut self, signals: &[Signals], band: &Band, standstill: &[f64], curvature: &[Vec<Vec<f64>>]) {
+        self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
+            let mut bent = vec![0.0; band.rows.len()];
+            for (e, s) in signals.iter().enumerate() {
+                let counts: Vec<bool> = s.v[j].iter().map(|v| v.abs() >= standstill[j]).collect();
+                for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts, &curvature[e][j])) {
+                    bent[row] = x.unwrap_or(0.0);
+                }
+            }
+            for (i, &row) in rows.rows.iter().enumerate() {
+                rows.target[i] = rows.linear_target[i] + bent[row];
+            }
+        });
+        self.accumulate(band);
+    }
+
+    /// Number of blocks that hold rows.
+    pub fn blocks_used(&self) -> usize {
+        self.blocks.iter().filter(|b| b.square > 0.0).count()
+    }
+
+    /// Weights from what a fit of all candidates leaves: size and correlation of each joint's rest, outliers down-weighted.
+    fn weigh(&mut self, band: &Band) {
+        self.sigma = self.scale.clone();
+        self.accumulate(band);
+        let all: Vec<usize> = (0..self.bounds.len()).collect();
+        for _ in 0..3 {
+            let theta = self.solve(&all, &self.total);
+            for (j, rows) in self.joints.iter_mut().enumerate() {
+                let rest = rows.residual(&all, &theta);
+                if rest.len() < 8 {
+                    continue;
+                }
+                let mut size: Vec<f64> = rest.iter().map(|r| r.abs()).collect();
+                let middle = size.len() / 2;
+                let spread = 1.4826 * *size.select_nth_unstable_by(middle, f64::total_cmp).1;
+                let least = IMMATERIAL * self.scale[j];
+                for (weight, r) in rows.robust.iter_mut().zip(&rest) {
+                    let z = r.abs() / (HUBER * spread.max(least));
+                    *weight = if z > 1.0 { 1.0 / z } else { 1.0 };
+                }
+                let clipped: Vec<f64> = rest.iter().zip(&rows.robust).map(|(r, w)| r * w).collect();
+                let free = rows.rows.len().saturating_sub(rows.columns.len()).max(1);
+                self.sigma[j] = (clipped.iter().map(|r| r * r).sum::<f64>() / free as f64).sqrt().max(least);
+                self.correlation[j] = correlation_time(&clipped);
+            }
+            self.accumulate(band);
+        }
+    }
+
+    /// Normal equations of every block. Rows are weighted, not whitened: whitening would rest the fit on the fast edges of
+    /// the signals, where simple laws (a friction step) are least true.
+    fn accumulate(&mut self, band: &Band) {
+        let p = self.bounds.len();
+        let mut blocks = vec![Normal::zeros(p); band.blocks];
+        for (j, rows) in self.joints.iter().enumerate() {
+            let scale = 1.0 / (self.sigma[j] * self.sigma[j] * self.correlation[j]);
+            let m = rows.columns.len();
+            for (i, &row) in rows.rows.iter().enumerate() {
+                let normal = &mut blocks[band.rows[row].block];
+                let weight = rows.robust[i] * scale;
+                let values = &rows.values[i * m..(i + 1) * m];
+                let target = rows.target[i];
+                normal.square += weight * target * target;
+                for (a, &ca) in rows.columns.iter().enumerate() {
+                    let x = weight * values[a];
+                    normal.moment[ca] += x * target;
+                    for (b, &cb) in rows.columns[..=a].iter().enumerate() {
+                        // Columns ascend, so this fills the lower triangle.
+                        normal.gram[(ca, cb)] += x * values[b];
+                    }
+                }
+            }
+        }
+        let mut total = Normal::zeros(p);
+        for normal in &mut blocks {
+            normal.gram.fill_upper_triangle_with_lower_triangle();
+            total.add(normal);
+        }
+        self.training = (0..self.folds)
+            .map(|fold| {
+                let mut rest = Normal::zeros(p);
+                for (normal, &of) in blocks.iter().zip(&self.fold_of_block) {
+                    if of != fold {
+                        rest.add(normal);
+                    }
+                }
+                rest
+            })
+            .collect();
+        self.blocks = blocks;
+        self.total = total;
+    }
+
+    /// Columns of a set of candidates, the alignment first.
+    pub fn columns(&self, set: &[usize]) -> Vec<usize> {
+        std::iter::once(0).chain(set.iter().flat_map(|&c| self.entries[c].columns.clone())).collect()
+    }
+
+    /// Coefficients of the columns on all rows.
+    pub fn fit(&self, columns: &[usize]) -> Vec<f64> {
+        self.solve(columns, &self.total)
+    }
+
+    /// Coefficients of the columns on all rows outside a fold.
+    pub fn fit_without(&self, columns: &[usize], fold: usize) -> Vec<f64> {
+        self.solve(columns, &self.training[fold])
+    }
+
+    /// Held-out deviance of each block.
+    pub fn held_out(&self, set: &[usize]) -> Vec<f64> {
+        let columns = self.columns(set);
+        let fits: Vec<Vec<f64>> = (0..self.folds).map(|fold| self.fit_without(&columns, fold)).collect();
+        self.blocks
+            .iter()
+            .zip(&self.fold_of_block)
+            .map(|(block, &fold)| block.deviance(&columns, &fits[fold]))
+            .collect()
+    }
+
+    /// Covariance of the coefficients by the sandwich over blocks, which allows for any correlation inside a block.
+    pub fn covariance(&self, columns: &[usize], theta: &[f64]) -> DMatrix<f64> {
+        let m = columns.len();
+        let mut meat = DMatrix::zeros(m, m);
+        let mut used = 0;
+        for block in self.blocks.iter().filter(|b| b.square > 0.0) {
+            let score = DVector::from_fn(m, |i, _| {
+                let g: f64 = columns.iter().zip(theta).map(|(&c, t)| block.gram[(columns[i], c)] * t).sum();
+                block.moment[columns[i]] - g
+            });
+            meat += &score * score.transpose();
+            used += 1;
+        }
+        let bread = self.regular(columns, &self.total).cholesky().map(|c| c.inverse());
+        let Some(bread) = bread else { return DMatrix::from_element(m, m, f64::INFINITY) };
+        let factor = if used > 1 { used as f64 / (used - 1) as f64 } else { f64::INFINITY };
+        &bread * meat * &bread * factor
+    }
+
+    /// Root mean square of what some columns add to each joint.
+    pub fn contribution(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {
+        self.joints
+            .iter()
+            .map(|rows| {
+                let sum: f64 = rows.predict(columns, theta).iter().map(|x| x * x).sum();
+                (sum / rows.rows.len().max(1) as f64).sqrt()
+            })
+            .collect()
+    }
+
+    /// What some columns add to one joint, row by row.
+    pub fn predict(&self, joint: usize, columns: &[usize], theta: &[f64]) -> Vec<f64> {
+        self.joints[joint].predict(columns, theta)
+    }
+
+    fn regular(&self, columns: &[usize], normal: &Normal) -> DMatrix<f64> {
+        let mut gram = DMatrix::from_fn(columns.len(), columns.len(), |i, j| normal.gram[(columns[i], columns[j])]);
+        for i in 0..columns.len() {
+            gram[(i, i)] = gram[(i, i)] * (1.0 + RIDGE) + f64::MIN_POSITIVE.sqrt();
+        }
+        gram
+    }
+
+    /// Bounded least squares by an active set: coefficients beyond a bound are held there while that lowers the deviance.
+    fn solve(&self, columns: &[usize], normal: &Normal) -> Vec<f64> {
+        let m = columns.len();
+        let gram = self.regular(columns, normal);
+        let moment = DVector::from_fn(m, |i, _| normal.moment[columns[i]]);
+        let mut held: Vec<Option<f64>> = vec![None; m];
+        let mut theta = vec![0.0; m];
+        for _ in 0..3 * m + 3 {
+            let free: Vec<usize> = (0..m).filter(|&i| held[i].is_none()).collect();
+            let sub = DMatrix::from_fn(free.len(), free.len(), |a, b| gram[(free[a], free[b])]);
+            let right = DVector::from_fn(free.len(), |a, _| {
+                let fixed: f64 = (0..m).filter_map(|j| held[j].map(|h| gram[(free[a], j)] * h)).sum();
+                moment[free[a]] - fixed
+            });
+            let Some(cholesky) = sub.cholesky() else { return vec![0.0; m] };
+            let solution = cholesky.solve(&right);
+            for i in 0..m {
+                if let Some(value) = held[i] {
+                    theta[i] = value;
+                }
+            }
+            for (a, &i) in free.iter().enumerate() {
+                theta[i] = solution[a];
+            }
+            // The worst violation, in units of the column's own size, goes to its bound.
+            let worst = free
+                .iter()
+                .filter_map(|&i| {
+                    let (low, high) = self.bounds[columns[i]];
+                    let over = (low - theta[i]).max(theta[i] - high);
+                    (over > 0.0).then(|| (over * gram[(i, i)].sqrt(), i, if theta[i] < low { low } else { high }))
+                })
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((_, i, bound)) = worst {
+                held[i] = Some(bound);
+                continue;
+            }
+            // All inside: let go of a bound whose gradient points inwards.
+            let release = (0..m).filter(|&i| held[i].is_some()).find(|&i| {
+                let gradient: f64 = moment[i] - (0..m).map(|j| gram[(i, j)] * theta[j]).sum::<f64>();
+                let (low, high) = self.bounds[columns[i]];
+                let tolerance = 1e-9 * (gram[(i, i)] * normal.square).sqrt();
+                (theta[i] <= low && gradient > tolerance) || (theta[i] >= high && gradient < -tolerance)
+            });
+            match release {
+                Some(i) => held[i] = None,
+                None => break,
+            }
+        }
+        theta
+    }
+}
+
+impl JointRows {
+    fn predict(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {
+        let used: Vec<(usize, f64)> = columns
+            .iter()
+            .zip(theta)
+            .filter_map(|(c, &t)| self.columns.binary_search(c).ok().map(|at| (at, t)))
+            .collect();
+        let m = self.columns.len();
+        (0..self.rows.len()).map(|i| used.iter().map(|&(at, t)| self.values[i * m + at] * t).sum()).collect()
+    }
+
+    fn residual(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {
+        self.predict(columns, theta).iter().zip(&self.target).map(|(p, y)| y - p).collect()
+    }
+}
+
+/// Directions of a candidate's coefficients along which the torque moves, from its part of the normal equations.
+fn rank(gram: &DMatrix<f64>, columns: &Range<usize>) -> usize {
+    let size: Vec<f64> = columns.clone().map(|c| gram[(c, c)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(size.len(), size.len(), |i, j| {
+        let product = size[i] * size[j];
+        if product > 0.0 { gram[(columns.start + i, columns.start + j)] / product } else { 0.0 }
+    });
+    let values = scaled.symmetric_eigenvalues();
+    values.iter().filter(|v| **v > RANK_TOLERANCE * values.max()).count().max(1)
+}
+
+/// Rows per independent row: 1 + 2 Σ ρ_k over the first lags whose autocorrelation ρ_k is positive.
+fn correlation_time(x: &[f64]) -> f64 {
+    let power: f64 = x.iter().map(|v| v * v).sum();
+    if power <= 0.0 {
+        return 1.0;
+    }
+    let mut time = 1.0;
+    for lag in 1..x.len().min(100) {
+        let rho = x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum::<f64>() / power;
+        if rho < 0.05 {
+            break;
+        }
+        time += 2.0 * rho;
+    }
+    time
+}

@@ -1,0 +1,360 @@
+//! The public JSON of a diagnosis, schema `gapscope.diagnosis/1`, and of an evaluation, `gapscope.evaluation/1`.
+//!
+//! Maps are keyed by joint name and sorted, so that the same diagnosis gives the same bytes.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A figure per joint, keyed by joint name.
+pub type PerJoint = BTreeMap<String, f64>;
+
+/// The public name of the diagnosis schema.
+pub const DIAGNOSIS_SCHEMA: &str = "gapscope.diagnosis/1";
+/// The public name of the evaluation schema.
+pub const EVALUATION_SCHEMA: &str = "gapscope.evaluation/1";
+
+/// Answer to the three questions: where, which, how far.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// Always [`DIAGNOSIS_SCHEMA`].
+    pub schema: String,
+    /// Name of the robot in its URDF.
+    pub robot: String,
+    /// Joint names in model order.
+    pub joints: Vec<String>,
+    /// What was read, and what was odd in it.
+    pub data: DataSummary,
+    /// The answer in a word.
+    pub verdict: Verdict,
+    /// Where the gap lies.
+    pub gap: Gap,
+    /// Which effects cause it, strongest first; empty for `no_gap`.
+    pub effects: Vec<FoundEffect>,
+    /// Other sets of effects that the logs do not exclude.
+    pub alternatives: Vec<Alternative>,
+    /// What is left after the effects.
+    pub unexplained: Unexplained,
+    /// How far the gap shrinks on held-out data with all effects together.
+    pub shrink: Shrink,
+    /// The motion that would separate what these logs cannot; `None` where nothing is left to separate.
+    pub next_experiment: Option<NextExperiment>,
+}
+
+/// What was read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DataSummary {
+    /// Number of continuous runs.
+    pub episodes: usize,
+    /// Number of samples in all episodes.
+    pub samples: usize,
+    /// Total length, s.
+    pub duration: f64,
+    /// Median sampling rate, Hz.
+    pub rate: f64,
+    /// Band in which torque is compared: cut-off of the zero-phase low-pass filter, Hz.
+    pub band: f64,
+    /// What was odd in the robot description and the logs, in words.
+    pub findings: Vec<String>,
+}
+
+/// The answer in a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Model and robot agree to within the noise of the log.
+    NoGap,
+    /// The effects named explain the gap.
+    Explained,
+    /// The effects named explain part of the gap; something else is left.
+    PartlyExplained,
+    /// There is a gap that no effect of the catalogue explains.
+    UnknownEffect,
+    /// The logs are too short or too still to tell.
+    NotExcited,
+}
+
+/// Where the gap of the nominal model lies, on held-out data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Gap {
+    /// Inverse-dynamics torque, N m (N for prismatic joints).
+    pub torque: TorqueGap,
+    /// One step x_{t+1} − f_phys(x_t, τ_t).
+    pub one_step: StateGap,
+    /// Open-loop rollouts under the logged effort, by horizon.
+    pub rollout: Vec<RolloutGap>,
+    /// Share of each regime in its joint's squared torque gap.
+    pub regimes: Vec<Regime>,
+}
+
+/// Torque gap per joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TorqueGap {
+    /// Root mean square of measured minus nominal torque.
+    pub rms: PerJoint,
+    /// What the noise of the log alone gives.
+    pub floor: PerJoint,
+    /// 95 % interval of `rms` by block bootstrap.
+    pub ci95: BTreeMap<String, [f64; 2]>,
+}
+
+/// One-step error per joint, rms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StateGap {
+    /// rad (m).
+    pub position: PerJoint,
+    /// rad/s (m/s).
+    pub velocity: PerJoint,
+}
+
+/// Position error of rollouts at one horizon, rms over starts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RolloutGap {
+    /// Horizon, s.
+    pub horizon: f64,
+    /// rad (m).
+    pub position: PerJoint,
+}
+
+/// One regime of one joint: `standstill`, `reversal`, `low_speed`, `high_speed`, `high_load`, `high_acceleration`, `pose`, `frequency_band` or `time`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Regime {
+    /// Joint name.
+    pub joint: String,
+    /// Name of the regime.
+    pub regime: String,
+    /// What bounds the regime: quantity with unit and its interval, e.g. `speed`, `rad/s`, `[0, 0.05]`.
+    pub bounds: Bounds,
+    /// Part of the joint's squared torque gap that lies in this regime.
+    pub share: f64,
+    /// 95 % interval of `share`.
+    pub ci95: [f64; 2],
+    /// Part of the samples that lie in this regime (for a frequency band, part of the effort's variation): a share well above
+    /// it marks the regime.
+    pub samples: f64,
+}
+
+/// Interval of a quantity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Bounds {
+    /// Quantity, e.g. `speed`.
+    pub quantity: String,
+    /// Unit.
+    pub unit: String,
+    /// From, to; `None` where open.
+    pub interval: [Option<f64>; 2],
+}
+
+/// One effect that was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FoundEffect {
+    /// Public name in the catalogue.
+    pub kind: String,
+    /// Joints affected, by name; empty for robot-wide effects.
+    pub joints: Vec<String>,
+    /// Probability that the effect is there.
+    pub confidence: f64,
+    /// Parameters by public name.
+    pub parameters: BTreeMap<String, Parameter>,
+    /// Kinds of effect that these logs cannot tell from this one, likeliest first.
+    pub indistinguishable_from: Vec<String>,
+    /// What the gap loses by this effect alone.
+    pub shrink: EffectShrink,
+}
+
+/// A parameter's value, one for the robot or one per joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Parameter {
+    /// One value.
+    Single(Estimate),
+    /// One value for each joint.
+    PerJoint(BTreeMap<String, Estimate>),
+}
+
+/// A value with its interval. Vectors (`com`, `inertia`, `force`) give both as arrays.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Estimate.
+    pub value: Quantity,
+    /// 95 % interval.
+    pub ci95: [Quantity; 2],
+    /// Unit.
+    pub unit: String,
+}
+
+/// A number or a vector.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Quantity {
+    /// A number.
+    Scalar(f64),
+    /// A vector, e.g. a centre of mass (3) or an inertia (xx, xy, yy, xz, yz, zz).
+    Vector(Vec<f64>),
+}
+
+/// What the held-out torque gap loses by one effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectShrink {
+    /// 1 − after/before with this effect alone in the model; `None` where the gap is at the floor.
+    pub torque: Option<f64>,
+}
+
+/// Another set of effects that could be behind the gap.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Alternative {
+    /// Kinds of effect.
+    pub effects: Vec<String>,
+    /// Probability.
+    pub probability: f64,
+}
+
+/// What is left after the effects.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Unexplained {
+    /// Squared gap left above the floor over the squared gap before.
+    pub fraction: f64,
+    /// Where it sits.
+    pub regimes: Vec<Regime>,
+}
+
+/// How far the gap shrinks on held-out data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Shrink {
+    /// Weighted rms torque.
+    pub torque: Change,
+    /// Rms one-step velocity error over the joints that move, rad/s (m/s).
+    pub one_step: Change,
+    /// Rms rollout position error over the joints that move, by horizon, rad (m).
+    pub rollout: Vec<HorizonChange>,
+    /// Reference figures in the measure of `torque.after`.
+    pub reference: Reference,
+}
+
+/// A gap before and after.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Change {
+    /// Nominal model; `None` where it cannot be simulated (singular mass matrix).
+    pub before: Option<f64>,
+    /// Corrected model; `None` where it cannot be simulated.
+    pub after: Option<f64>,
+    /// 1 − after/before; `None` where `before` is at the floor.
+    pub shrink: Option<f64>,
+    /// 95 % interval of `shrink`.
+    pub ci95: Option<[f64; 2]>,
+}
+
+impl Change {
+    /// The gap before and after, NaN where it is unknown: for arithmetic and for printing.
+    pub fn gaps(&self) -> [f64; 2] {
+        [self.before, self.after].map(|gap| gap.unwrap_or(f64::NAN))
+    }
+}
+
+/// A gap before and after at one horizon.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HorizonChange {
+    /// Horizon, s.
+    pub horizon: f64,
+    /// The change.
+    #[serde(flatten)]
+    pub change: Change,
+}
+
+/// Reference figures, in the measure of `torque.after`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reference {
+    /// What noise alone gives.
+    pub noise_floor: f64,
+    /// A residual network on top of the nominal model; `None` where it was not trained.
+    pub residual_network: Option<f64>,
+    /// A pure network; `None` where it was not trained.
+    pub pure_network: Option<f64>,
+}
+
+/// A motion that would separate what the logs cannot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NextExperiment {
+    /// Why, in a sentence.
+    pub why: String,
+    /// Kinds of effect that it separates.
+    pub separates: Vec<String>,
+    /// The motion in words; a trajectory file comes with a later version.
+    pub motion: String,
+}
+
+/// Result of `evaluate`: the gap on other logs, before and after.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Evaluation {
+    /// Always [`EVALUATION_SCHEMA`].
+    pub schema: String,
+    /// Gap of the nominal model over all logs.
+    pub gap: Gap,
+    /// Change by the corrected model; `None` without one.
+    pub shrink: Option<Shrink>,
+    /// The same per log.
+    pub logs: Vec<LogEvaluation>,
+}
+
+/// One log's evaluation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LogEvaluation {
+    /// File name.
+    pub log: String,
+    /// Torque gap per joint.
+    pub torque: TorqueGap,
+    /// Change of the weighted torque gap; `None` without a corrected model.
+    pub shrink: Option<Change>,
+}
+
+/// What the report draws beside the diagnosis; not part of the public JSON.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Evidence {
+    /// One entry per joint, model order.
+    pub torque: Vec<TorqueSeries>,
+    /// One entry per effect and joint, strongest effect first.
+    pub curves: Vec<EffectCurve>,
+    /// Gap of the corrected model on the same held-out data, in the form of `Diagnosis::gap`; `None` where no effect was found.
+    pub remaining: Option<Gap>,
+    /// Robot description as given on the command line; empty where unknown.
+    pub robot_file: String,
+    /// Logs as given on the command line; may be empty.
+    pub logs: Vec<String>,
+    /// The corrected model written beside the report, e.g. `corrected.json`; empty where none was written.
+    pub corrected_file: String,
+}
+
+/// Measured and modelled torque of one joint over time, thinned for drawing; held-out fits.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TorqueSeries {
+    /// Joint name.
+    pub joint: String,
+    /// `N m` or `N`.
+    pub unit: String,
+    /// Time over all episodes one after another, s.
+    pub time: Vec<f64>,
+    /// Measured, band-limited.
+    pub measured: Vec<f64>,
+    /// Nominal model.
+    pub nominal: Vec<f64>,
+    /// Corrected model.
+    pub corrected: Vec<f64>,
+    /// Indices at which a new episode begins.
+    pub breaks: Vec<usize>,
+}
+
+/// The law of one effect at one joint with the data behind it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EffectCurve {
+    /// Public name of the effect.
+    pub kind: String,
+    /// Joint name.
+    pub joint: String,
+    /// Quantity on the horizontal axis with its unit, e.g. `speed, rad/s`.
+    pub x_label: String,
+    /// Unit of the torque on the vertical axis.
+    pub unit: String,
+    /// Partial residuals: horizontal value, measured torque less all other effects and the nominal model. At most some thousand points.
+    pub data: Vec<[f64; 2]>,
+    /// The fitted law, sorted by the horizontal value.
+    pub law: Vec<[f64; 2]>,
+}

@@ -1,0 +1,306 @@
+//! Which candidates: best subset by local search on held-out deviance, then pruning by the one-standard-error rule.
+
+use crate::problem::Problem;
+use gapscope_effects::Kind;
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Cost of a kind of effect, in units of ln(effective rows), beside one unit for each coefficient (BIC).
+const KIND_COST: f64 = 2.0;
+/// Cost of a coefficient on a further joint of a kind that joints usually share, because their drives are alike.
+const SHARED_COST: f64 = 2.0;
+/// Kinds that joints usually share.
+const SHARED: [Kind; 4] = [Kind::ViscousFriction, Kind::CoulombFriction, Kind::Armature, Kind::TorqueBias];
+/// Cost of a kind that few robots have: where two kinds explain the same, it is the commoner one, by prior.
+const RARE_COST: f64 = 2.0;
+/// A candidate stays where leaving it out costs more than this many standard errors of the paired difference over blocks.
+const STANDARD_ERRORS: f64 = 2.0;
+/// The same for a further joint of a kind that joints usually share.
+const SHARED_STANDARD_ERRORS: f64 = 0.5;
+/// And the part of the least torque of a new effect that it must move the joint by.
+const SHARED_SIZE: f64 = 0.5;
+/// Moves of the local search, at most.
+const MOVES: usize = 60;
+
+/// A set of candidates with its held-out deviance.
+#[derive(Debug, Clone)]
+pub struct Choice {
+    /// Indices of candidates, ascending.
+    pub set: Vec<usize>,
+    /// Held-out deviance of each block.
+    pub blocks: Vec<f64>,
+    /// Deviance plus the cost of complexity.
+    pub objective: f64,
+}
+
+/// A rival to a kind of effect that was chosen.
+#[derive(Debug, Clone)]
+pub struct Rival {
+    /// The kind that is left out.
+    pub without: Kind,
+    /// What was chosen in its stead.
+    pub choice: Choice,
+    /// Probability that the rival predicts held-out data better than the choice.
+    pub probability: f64,
+}
+
+/// Kinds in a set, ascending.
+pub fn kinds(problem: &Problem, set: &[usize]) -> Vec<Kind> {
+    let mut kinds: Vec<Kind> = set.iter().map(|&c| problem.entries[c].candidate.kind).collect();
+    kinds.sort();
+    kinds.dedup();
+    kinds
+}
+
+/// Chooses a set of candidates, none of the kinds in `forbidden`, starting from `start`.
+pub fn choose(problem: &Problem, start: &[usize], forbidden: &[Kind]) -> Choice {
+    let mut best = evaluate(problem, start.to_vec());
+    for _ in 0..MOVES {
+        let next = moves(problem, &best.set, forbidden)
+            .into_par_iter()
+            .map(|set| evaluate(problem, set))
+            .min_by(|a, b| a.objective.total_cmp(&b.objective).then_with(|| a.set.cmp(&b.set)));
+        match next {
+            Some(next) if next.objective < best.objective - 1e-9 * best.objective.abs() => best = next,
+            _ => break,
+        }
+    }
+    let simple = simplify(problem, prune(problem, best), forbidden);
+    prune(problem, grow(problem, simple))
+}
+
+/// Takes the simpler of two nested laws, a bias for a spring, where the richer one is not better by a standard error or
+/// its torque hardly differs.
+fn simplify(problem: &Problem, mut choice: Choice, forbidden: &[Kind]) -> Choice {
+    if forbidden.contains(&Kind::TorqueBias) {
+        return choice;
+    }
+    for c in choice.set.clone() {
+        let spring = &problem.entries[c].candidate;
+        if spring.kind != Kind::ParallelSpring {
+            continue;
+        }
+        let bias = (0..problem.entries.len()).find(|&other| {
+            let other = &problem.entries[other].candidate;
+            other.kind == Kind::TorqueBias && other.joints == spring.joints
+        });
+        let Some(bias) = bias else { continue };
+        let set = choice.set.iter().map(|&other| if other == c { bias } else { other }).collect();
+        let simpler = evaluate(problem, set);
+        let (loss, error) = paired_difference(&simpler.blocks, &choice.blocks);
+        let same = moved(problem, &choice, &simpler).iter().zip(&problem.least).all(|(moved, least)| moved <= least);
+        if loss <= error || same {
+            choice = simpler;
+        }
+    }
+    choice
+}
+
+/// Adds further joints of the kinds that joints usually share and that are there already.
+fn grow(problem: &Problem, mut choice: Choice) -> Choice {
+    loop {
+        let present = kinds(problem, &choice.set);
+        let better = (0..problem.entries.len())
+            .into_par_iter()
+            .filter(|&c| {
+                let kind = problem.entries[c].candidate.kind;
+                SHARED.contains(&kind)
+                    && present.contains(&kind)
+                    && !choice.set.iter().any(|&other| excludes(problem, other, c))
+            })
+            .map(|c| evaluate(problem, choice.set.iter().copied().chain([c]).collect()))
+            .min_by(|a, b| a.objective.total_cmp(&b.objective).then_with(|| a.set.cmp(&b.set)));
+        match better {
+            Some(better) if better.objective < choice.objective => choice = better,
+            _ => return choice,
+        }
+    }
+}
+
+/// For each kind that was chosen, the best set without it.
+pub fn rivals(problem: &Problem, choice: &Choice) -> Vec<Rival> {
+    kinds(problem, &choice.set)
+        .into_iter()
+        .map(|without| {
+            let rest: Vec<usize> =
+                choice.set.iter().copied().filter(|&c| problem.entries[c].candidate.kind != without).collect();
+            let rival = choose(problem, &rest, &[without]);
+            let same = moved(problem, choice, &rival).iter().zip(&problem.least).all(|(moved, least)| moved <= least);
+            let probability = if same {
+                // They differ by less than what neither explains: only simplicity and prior speak, and never for the rival.
+                let gain = 0.5 * (rival.objective - choice.objective).max(0.0);
+                1.0 / (1.0 + gain.exp())
+            } else {
+                1.0 - probability_better(choice, &rival)
+            };
+            Rival { without, choice: rival, probability }
+        })
+        .collect()
+}
+
+/// A set as it stands.
+pub fn evaluate(problem: &Problem, mut set: Vec<usize>) -> Choice {
+    set.sort_unstable();
+    let blocks = problem.held_out(&set);
+    let cost: f64 = kinds(problem, &set)
+        .into_iter()
+        .map(|kind| {
+            let of_kind = || set.iter().map(|&c| &problem.entries[c]).filter(move |e| e.candidate.kind == kind);
+            let coefficients: usize = of_kind().map(|e| e.rank).sum();
+            let unit = problem.effective_rows().ln();
+            if SHARED.contains(&kind) {
+                (1.0 + KIND_COST) * unit + SHARED_COST * (coefficients - 1) as f64
+            } else {
+                (coefficients as f64 + KIND_COST) * unit + RARE_COST
+            }
+        })
+        .sum();
+    let objective = blocks.iter().sum::<f64>() + cost;
+    Choice { set, blocks, objective }
+}
+
+/// Neighbours of a set: one candidate more, less or exchanged; a kind on all joints more, less or exchanged.
+fn moves(problem: &Problem, set: &[usize], forbidden: &[Kind]) -> Vec<Vec<usize>> {
+    let allowed = |c: usize| !forbidden.contains(&problem.entries[c].candidate.kind);
+    let fits_in = |set: &[usize], c: usize| allowed(c) && !set.iter().any(|&other| excludes(problem, other, c));
+    let count = problem.entries.len();
+    let mut neighbours = Vec::new();
+    let without = |gone: usize| -> Vec<usize> { set.iter().copied().filter(|&c| c != gone).collect() };
+    let with = |mut base: Vec<usize>, c: usize| {
+        base.push(c);
+        base
+    };
+    for c in (0..count).filter(|&c| fits_in(set, c)) {
+        neighbours.push(with(set.to_vec(), c));
+    }
+    for &gone in set {
+        let rest = without(gone);
+        let joints = &problem.entries[gone].candidate.joints;
+        for c in (0..count).filter(|&c| c != gone && fits_in(&rest, c)) {
+            let other = &problem.entries[c].candidate.joints;
+            if other.is_empty() || joints.is_empty() || joints.iter().any(|j| other.contains(j)) {
+                neighbours.push(with(rest.clone(), c));
+            }
+        }
+        neighbours.push(rest);
+    }
+    let fill = |mut base: Vec<usize>, kind: Kind| {
+        for c in 0..count {
+            if problem.entries[c].candidate.kind == kind && fits_in(&base, c) {
+                base.push(c);
+            }
+        }
+        base
+    };
+    let present = kinds(problem, set);
+    let per_joint = [
+        Kind::ViscousFriction,
+        Kind::CoulombFriction,
+        Kind::Armature,
+        Kind::TorqueGainError,
+        Kind::TorqueBias,
+        Kind::ParallelSpring,
+    ];
+    for kind in per_joint {
+        neighbours.push(fill(set.to_vec(), kind));
+    }
+    for &gone in &present {
+        let rest: Vec<usize> = set.iter().copied().filter(|&c| problem.entries[c].candidate.kind != gone).collect();
+        for kind in Kind::LINEAR.into_iter().filter(|&k| k != gone) {
+            neighbours.push(fill(rest.clone(), kind));
+        }
+        neighbours.push(rest);
+    }
+    neighbours.iter_mut().for_each(|s| s.sort_unstable());
+    neighbours.sort();
+    neighbours.dedup();
+    neighbours.retain(|s| s != set);
+    neighbours
+}
+
+/// Whether two candidates must not stand side by side: the same one, a spring beside a bias (its rest position is one),
+/// or the two signs of a coupling.
+fn excludes(problem: &Problem, a: usize, b: usize) -> bool {
+    let (a, b) = (&problem.entries[a].candidate, &problem.entries[b].candidate);
+    let pair = |x, y| (a.kind == x && b.kind == y) || (a.kind == y && b.kind == x);
+    a.joints == b.joints && (a.kind == b.kind || pair(Kind::ParallelSpring, Kind::TorqueBias))
+}
+
+/// Takes away, weakest first, what does not lower the held-out deviance beyond doubt or does not matter.
+fn prune(problem: &Problem, mut choice: Choice) -> Choice {
+    loop {
+        let columns = problem.columns(&choice.set);
+        let theta = problem.fit(&columns);
+        let weakest = choice
+            .set
+            .par_iter()
+            .map(|&c| {
+                let rest = evaluate(problem, choice.set.iter().copied().filter(|&other| other != c).collect());
+                let own = problem.entries[c].columns.clone();
+                let own_theta: Vec<f64> =
+                    columns.iter().zip(&theta).filter(|(col, _)| own.contains(col)).map(|(_, t)| *t).collect();
+                let moved = problem.contribution(&own.clone().collect::<Vec<_>>(), &own_theta);
+                let kind = problem.entries[c].candidate.kind;
+                let others = choice.set.iter().filter(|&&other| problem.entries[other].candidate.kind == kind).count();
+                let shared = SHARED.contains(&kind) && others > 1;
+                let needed = if shared { SHARED_STANDARD_ERRORS } else { STANDARD_ERRORS };
+                let part = if shared { SHARED_SIZE } else { 1.0 };
+                let matters = moved.iter().zip(&problem.least).any(|(rms, least)| *rms > part * least);
+                // A law that wants to be bigger than it can physically be is some other law.
+                let matters = matters
+                    && own.clone().all(|column| {
+                        let at = columns.iter().position(|&c| c == column);
+                        at.is_none_or(|at| theta[at] < problem.bounds[column].1)
+                    });
+                let score = if matters { standard_errors(&rest.blocks, &choice.blocks) } else { f64::NEG_INFINITY };
+                (score - needed, c, rest)
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        match weakest {
+            Some((score, _, rest)) if score < 0.0 => choice = rest,
+            _ => return choice,
+        }
+    }
+}
+
+/// Root mean square difference of the torque that two choices predict, per joint.
+fn moved(problem: &Problem, a: &Choice, b: &Choice) -> Vec<f64> {
+    let predict = |choice: &Choice| {
+        let columns = problem.columns(&choice.set);
+        let theta = problem.fit(&columns);
+        (columns, theta)
+    };
+    let ((columns_a, theta_a), (columns_b, theta_b)) = (predict(a), predict(b));
+    (0..problem.least.len())
+        .map(|j| {
+            let (a, b) = (problem.predict(j, &columns_a, &theta_a), problem.predict(j, &columns_b, &theta_b));
+            let square: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
+            (square / a.len().max(1) as f64).sqrt()
+        })
+        .collect()
+}
+
+/// How many standard errors `worse` lies above `better`, paired by block.
+fn standard_errors(worse: &[f64], better: &[f64]) -> f64 {
+    let (difference, error) = paired_difference(worse, better);
+    if error > 0.0 { difference / error } else { 0.0 }
+}
+
+/// Sum over blocks of `worse` − `better`, and its standard error.
+fn paired_difference(worse: &[f64], better: &[f64]) -> (f64, f64) {
+    let difference: Vec<f64> = worse.iter().zip(better).map(|(w, b)| w - b).collect();
+    let n = difference.len() as f64;
+    let mean = difference.iter().sum::<f64>() / n;
+    let variance = difference.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    (n * mean, (n * variance).sqrt())
+}
+
+/// Probability that `choice` is the better account than `rival`: normal in the difference of objectives (held-out
+/// deviance and cost of complexity), its standard error from the paired difference over blocks.
+fn probability_better(choice: &Choice, rival: &Choice) -> f64 {
+    let gain = rival.objective - choice.objective;
+    let (_, error) = paired_difference(&rival.blocks, &choice.blocks);
+    // Half a unit of log likelihood is noise between any two models, however alike their blocks.
+    let z = gain / error.max(1.0);
+    Normal::standard().cdf(z)
+}

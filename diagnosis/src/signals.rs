@@ -1,0 +1,177 @@
+//! From logs to signals that can be compared with a model: smoothed, consistent, on a uniform grid.
+//!
+//! Position is the only measured motion that enters: velocity and acceleration are its derivatives under the same kernel
+//! that averages the effort. A measured velocity has more noise in the band, and where the loop is closed through it that
+//! noise is in the effort too, which biases every estimate (Janot, Vandanjon, Gautier 2014); it is checked against the
+//! position when logs are read, not used here.
+
+use crate::kernel::{Kernel, apply};
+use gapscope_datasets::{Episode, Uniform, resample};
+use gapscope_dynamics::{Data, Model};
+use gapscope_effects::Motion;
+
+/// Half-width of the kernel that forms derivatives, s; about 46 Hz.
+const DERIVATIVE_HALF_WIDTH: f64 = 0.010;
+/// The same in samples at least, so that derivatives of slow logs are smoothed too.
+const DERIVATIVE_REACH: f64 = 5.0;
+/// Fraction of a joint's rms speed below which it counts as standing: its sign is then mostly noise and transients.
+const STANDSTILL_FRACTION: f64 = 0.03;
+/// Speeds under this many standard deviations of their noise count as standing.
+const STANDSTILL_NOISE: f64 = 4.0;
+/// Rate of the smoothed signals, Hz, at most.
+const SIGNAL_RATE: f64 = 500.0;
+
+/// One episode's signals. Joint-major: `q[j][k]`.
+#[derive(Debug, Clone)]
+pub struct Signals {
+    /// Name of the log.
+    pub name: String,
+    /// The uniform log itself, at its own rate.
+    pub raw: Uniform,
+    /// Sample of `raw` at which signal 0 sits, and raw samples per signal.
+    pub first: usize,
+    /// Raw samples per signal.
+    pub stride: usize,
+    /// Time from one signal to the next, s.
+    pub dt: f64,
+    /// Position, rad or m.
+    pub q: Vec<Vec<f64>>,
+    /// Velocity, rad/s or m/s.
+    pub v: Vec<Vec<f64>>,
+    /// Acceleration, rad/s² or m/s².
+    pub a: Vec<Vec<f64>>,
+    /// Effort at the raw rate, disturbance included, held from sample to sample, N m or N.
+    pub effort: Vec<Vec<f64>>,
+    /// Smoothed effort, N m or N.
+    pub tau: Vec<Vec<f64>>,
+    /// Rate of change of the effort, N m/s or N/s.
+    pub tau_rate: Vec<Vec<f64>>,
+    /// Torque of the nominal robot on this motion, damping and friction of its URDF included, N m or N.
+    pub nominal: Vec<Vec<f64>>,
+    /// Standard deviation of the noise of each joint's velocity, rad/s or m/s.
+    pub velocity_noise: Vec<f64>,
+}
+
+impl Signals {
+    /// Signals of an episode; `None` where it is shorter than the kernel.
+    pub fn new(model: &Model, episode: &Episode) -> Option<Signals> {
+        let dt = 1.0 / episode.rate();
+        let raw = resample(episode, dt);
+        let kernel = derivative_kernel(dt);
+        let samples = raw.position.first().map_or(0, Vec::len);
+        let first = kernel.reach + 1;
+        if samples < 4 * first + 8 {
+            return None;
+        }
+        let n = model.dof();
+        let stride = ((1.0 / (SIGNAL_RATE * dt)).round() as usize).max(1);
+        let length = (samples - 2 * first).div_ceil(stride);
+        let filter = |weights: &[f64], x: &[f64], offset: usize| -> Vec<f64> {
+            (0..length).map(|k| apply(weights, x, first + k * stride - offset)).collect()
+        };
+        let each = |weights: &[f64], x: &[Vec<f64>], offset: usize| -> Vec<Vec<f64>> {
+            x.iter().map(|x| filter(weights, x, offset)).collect()
+        };
+        let effort: Vec<Vec<f64>> = match &raw.disturbance {
+            Some(d) => raw.effort.iter().zip(d).map(|(e, d)| e.iter().zip(d).map(|(e, d)| e + d).collect()).collect(),
+            None => raw.effort.clone(),
+        };
+        let q = each(&kernel.value, &raw.position, kernel.reach);
+        let v = each(&kernel.first, &raw.position, kernel.reach);
+        let a = each(&kernel.second, &raw.position, kernel.reach);
+        let tau = each(&kernel.held, &effort, kernel.reach + 1);
+        let rate_weights: Vec<f64> = {
+            let mut weights = kernel.first.clone();
+            weights.insert(0, 0.0);
+            weights
+        };
+        // The derivative of a held signal sits half a sample late, like the signal itself; fine for an alignment column.
+        let tau_rate = each(&rate_weights, &effort, kernel.reach + 1);
+        let gain = kernel.first.iter().map(|w| w * w).sum::<f64>().sqrt();
+        let velocity_noise = raw.position.iter().map(|x| position_noise(x) * gain).collect();
+        let signal_dt = dt * stride as f64;
+        let mut signals = Signals {
+            name: episode.name.clone(),
+            raw,
+            first,
+            stride,
+            dt: signal_dt,
+            q,
+            v,
+            a,
+            effort,
+            tau,
+            tau_rate,
+            nominal: vec![Vec::with_capacity(length); n],
+            velocity_noise,
+        };
+        signals.fill_nominal(model);
+        Some(signals)
+    }
+
+    /// Number of signals.
+    pub fn len(&self) -> usize {
+        self.q.first().map_or(0, Vec::len)
+    }
+
+    /// The motion that signatures read.
+    pub fn motion<'a>(&'a self, model: &'a Model, standstill: &'a [f64]) -> Motion<'a> {
+        Motion { model, q: &self.q, v: &self.v, a: &self.a, tau: &self.tau, nominal: &self.nominal, standstill }
+    }
+
+    /// Copies sample `k` of a joint-major signal.
+    pub fn gather(signal: &[Vec<f64>], k: usize, out: &mut [f64]) {
+        for (out, joint) in out.iter_mut().zip(signal) {
+            *out = joint[k];
+        }
+    }
+
+    fn fill_nominal(&mut self, model: &Model) {
+        let n = model.dof();
+        let mut data = Data::new(model);
+        let (mut q, mut v, mut a, mut tau) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        for k in 0..self.len() {
+            Signals::gather(&self.q, k, &mut q);
+            Signals::gather(&self.v, k, &mut v);
+            Signals::gather(&self.a, k, &mut a);
+            model.inverse_dynamics(&mut data, &q, &v, &a, &mut tau);
+            for (j, joint) in model.joints().iter().enumerate() {
+                self.nominal[j].push(tau[j] + joint.damping * v[j] + joint.friction * v[j].signum());
+            }
+        }
+    }
+}
+
+/// The kernel that forms derivatives of a log sampled every `dt` s.
+pub fn derivative_kernel(dt: f64) -> Kernel {
+    Kernel::new(DERIVATIVE_HALF_WIDTH.max(DERIVATIVE_REACH * dt), dt)
+}
+
+/// Speed below which each joint counts as standing, from noise and typical speed over all episodes.
+pub fn standstill(signals: &[Signals], joints: usize) -> Vec<f64> {
+    (0..joints)
+        .map(|j| {
+            let (mut square, mut count, mut noise) = (0.0, 0usize, 0.0f64);
+            for s in signals {
+                square += s.v[j].iter().map(|v| v * v).sum::<f64>();
+                count += s.len();
+                noise = noise.max(s.velocity_noise[j]);
+            }
+            let rms = (square / count.max(1) as f64).sqrt();
+            (STANDSTILL_FRACTION * rms).max(STANDSTILL_NOISE * noise).max(1e-9)
+        })
+        .collect()
+}
+
+/// Standard deviation of white noise on a smooth signal, from the median size of its fourth differences (1, −4, 6, −4, 1).
+fn position_noise(x: &[f64]) -> f64 {
+    let mut size: Vec<f64> =
+        x.windows(5).map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs()).filter(|d| *d > 0.0).collect();
+    if size.is_empty() {
+        return 0.0;
+    }
+    let middle = size.len() / 2;
+    let (_, median, _) = size.select_nth_unstable_by(middle, f64::total_cmp);
+    // 70 = Σ of the squared weights; 0.6745 = median of |N(0, 1)|.
+    *median / (0.6745 * 70f64.sqrt())
+}

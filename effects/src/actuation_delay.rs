@@ -1,0 +1,36 @@
+//! Effort that acts later than logged.
+//!
+//! τ_effective(t) = τ(t − delay), τ held between samples; a fraction of a sample is allowed.
+//! Source: Åström, Wittenmark, Computer-Controlled Systems (1997) (sampling a system with a time delay).
+
+use crate::effect::{Law, Value, check};
+use crate::{EffectError, Kind, Plant};
+use serde::{Deserialize, Serialize};
+
+/// The time between an effort's stamp in the log and its action.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActuationDelay {
+    /// s, from 0 to 1.
+    pub delay: f64,
+}
+
+impl Law for ActuationDelay {
+    fn kind(&self) -> Kind {
+        Kind::ActuationDelay
+    }
+
+    fn joints(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn parameters(&self) -> Vec<Value> {
+        vec![Value { name: "delay", joint: None, value: vec![self.delay], unit: "s", unit_prismatic: "s" }]
+    }
+
+    fn install(&self, plant: &mut Plant) -> Result<(), EffectError> {
+        check(self.kind(), "delay", self.delay, (0.0..=1.0).contains(&self.delay), "from zero to one")?;
+        plant.actuation.delay += self.delay;
+        Ok(())
+    }
+}

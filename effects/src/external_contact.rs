@@ -1,0 +1,51 @@
+//! An outside force for some of the time.
+//!
+//! M q̈ + C q̇ + g = τ + Jᵀ F inside the intervals, J the Jacobian of the link's centre of mass.
+//! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 7.2 (contact forces in joint space).
+
+use crate::effect::{Law, Value, check};
+use crate::plant::Contact;
+use crate::{EffectError, Kind, Plant};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A constant force on a link during some intervals.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExternalContact {
+    /// The link, by the name of its URDF link or of the joint that moves it.
+    pub link: String,
+    /// From and to, s since the start of the episode.
+    pub intervals: Vec<[f64; 2]>,
+    /// N, in the world frame, at the link's centre of mass.
+    pub force: [f64; 3],
+}
+
+impl Law for ExternalContact {
+    fn kind(&self) -> Kind {
+        Kind::ExternalContact
+    }
+
+    fn joints(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn parameters(&self) -> Vec<Value> {
+        let value = |name, value, unit| Value { name, joint: None, value, unit, unit_prismatic: unit };
+        vec![value("intervals", self.intervals.concat(), "s"), value("force", self.force.to_vec(), "N")]
+    }
+
+    fn install(&self, plant: &mut Plant) -> Result<(), EffectError> {
+        for force in self.force {
+            check(self.kind(), "force", force, true, "a finite number")?;
+        }
+        for &[from, to] in &self.intervals {
+            check(self.kind(), "intervals", from, true, "a finite number")?;
+            check(self.kind(), "intervals", to, to >= from, "no less than where the interval begins")?;
+        }
+        let named = plant.model().joints().iter().position(|joint| joint.link == self.link);
+        let link = named.map_or_else(|| plant.joint(self.kind(), &self.link), Ok)?;
+        plant.contacts.push(Contact { link, force: DVec3::from_array(self.force), intervals: self.intervals.clone() });
+        Ok(())
+    }
+}

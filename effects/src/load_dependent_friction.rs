@@ -1,0 +1,41 @@
+//! Friction of a loaded gear.
+//!
+//! M q̈ + C q̇ + g = τ − μ abs(τ) sign q̇ with the effort τ that the drive delivers; sticks at rest.
+//! Source: Hamon, Gautier, Garrec, IEEE/RSJ IROS 2010 (dry friction that depends on load and velocity).
+
+use crate::effect::{Law, Value, check, per_joint};
+use crate::{EffectError, Kind, Plant};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Dry friction in proportion to the size of the delivered effort.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadDependentFriction {
+    /// μ per joint.
+    pub load_coefficient: BTreeMap<String, f64>,
+}
+
+impl Law for LoadDependentFriction {
+    fn kind(&self) -> Kind {
+        Kind::LoadDependentFriction
+    }
+
+    fn joints(&self) -> Vec<String> {
+        self.load_coefficient.keys().cloned().collect()
+    }
+
+    fn parameters(&self) -> Vec<Value> {
+        per_joint("load_coefficient", &self.load_coefficient, "-", "-")
+    }
+
+    fn install(&self, plant: &mut Plant) -> Result<(), EffectError> {
+        for (joint, &coefficient) in &self.load_coefficient {
+            let allowed = (0.0..1.0).contains(&coefficient);
+            check(self.kind(), "load_coefficient", coefficient, allowed, "from zero to below one")?;
+            let j = plant.joint(self.kind(), joint)?;
+            plant.direction(&[(j, 1.0)]).load += coefficient;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,56 @@
+//! Friction that falls as the drive warms up.
+//!
+//! M q̈ + C q̇ + g = τ − f (ratio + (1 − ratio) e^{−t/T}) sign q̇, t from the start of the episode; sticks at rest.
+//! Source: Bittencourt, Gunnarsson, ASME J. Dyn. Sys. 134(5) 2012 (friction of a joint against load and temperature); the
+//! exponential is that of a drive that warms up as one heat capacity.
+
+use crate::effect::{Law, Value, check, per_joint, value_at};
+use crate::{EffectError, Kind, Plant};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Dry friction that decays from a cold to a warm level.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThermalDrift {
+    /// f per joint, N m (N): dry friction at the start.
+    pub coulomb: BTreeMap<String, f64>,
+    /// Part of f that is left once warm.
+    pub ratio: BTreeMap<String, f64>,
+    /// T per joint, s.
+    pub time_constant: BTreeMap<String, f64>,
+}
+
+impl Law for ThermalDrift {
+    fn kind(&self) -> Kind {
+        Kind::ThermalDrift
+    }
+
+    fn joints(&self) -> Vec<String> {
+        self.coulomb.keys().cloned().collect()
+    }
+
+    fn parameters(&self) -> Vec<Value> {
+        let mut values = per_joint("coulomb", &self.coulomb, "N m", "N");
+        values.extend(per_joint("ratio", &self.ratio, "-", "-"));
+        values.extend(per_joint("time_constant", &self.time_constant, "s", "s"));
+        values
+    }
+
+    fn install(&self, plant: &mut Plant) -> Result<(), EffectError> {
+        for (joint, &coulomb) in &self.coulomb {
+            check(self.kind(), "coulomb", coulomb, coulomb >= 0.0, "zero or more")?;
+            let ratio = value_at(self.kind(), "ratio", &self.ratio, joint)?;
+            check(self.kind(), "ratio", ratio, ratio >= 0.0, "zero or more")?;
+            let time_constant = value_at(self.kind(), "time_constant", &self.time_constant, joint)?;
+            check(self.kind(), "time_constant", time_constant, time_constant > 0.0, "greater than zero")?;
+            let j = plant.joint(self.kind(), joint)?;
+            let direction = plant.direction(&[(j, 1.0)]);
+            direction.coulomb += ratio * coulomb;
+            direction.cold_rise += (1.0 - ratio) * coulomb;
+            direction.time_constant = time_constant;
+            plant.drifts = true;
+        }
+        Ok(())
+    }
+}

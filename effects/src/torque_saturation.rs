@@ -1,0 +1,40 @@
+//! Clipped effort.
+//!
+//! τ_effective = min(max(τ, −limit), limit), after delay, lag, gain and bias.
+//! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), chapter 5 (limits of drives).
+
+use crate::effect::{Law, Value, check, per_joint};
+use crate::{EffectError, Kind, Plant};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The drive delivers no more than its limit.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TorqueSaturation {
+    /// limit per joint, N m (N).
+    pub limit: BTreeMap<String, f64>,
+}
+
+impl Law for TorqueSaturation {
+    fn kind(&self) -> Kind {
+        Kind::TorqueSaturation
+    }
+
+    fn joints(&self) -> Vec<String> {
+        self.limit.keys().cloned().collect()
+    }
+
+    fn parameters(&self) -> Vec<Value> {
+        per_joint("limit", &self.limit, "N m", "N")
+    }
+
+    fn install(&self, plant: &mut Plant) -> Result<(), EffectError> {
+        for (joint, &limit) in &self.limit {
+            check(self.kind(), "limit", limit, limit > 0.0, "greater than zero")?;
+            let j = plant.joint(self.kind(), joint)?;
+            plant.actuation.limit[j] = plant.actuation.limit[j].min(limit);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,46 @@
+//! Viscous friction.
+//!
+//! Joint space, n joints: M q̈ + C q̇ + g = τ − b q̇.
+//! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), eq. 7.21.
+
+use crate::effect::{Law, Value, check, per_joint};
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Friction in proportion to speed, −b q̇.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViscousFriction {
+    /// b per joint, N m s/rad (N s/m), beyond the damping that the URDF declares.
+    pub viscous: BTreeMap<String, f64>,
+}
+
+impl Law for ViscousFriction {
+    fn kind(&self) -> Kind {
+        Kind::ViscousFriction
+    }
+
+    fn joints(&self) -> Vec<String> {
+        self.viscous.keys().cloned().collect()
+    }
+
+    fn parameters(&self) -> Vec<Value> {
+        per_joint("viscous", &self.viscous, "N m s/rad", "N s/m")
+    }
+
+    fn install(&self, plant: &mut Plant) -> Result<(), EffectError> {
+        for (joint, &viscous) in &self.viscous {
+            check(self.kind(), "viscous", viscous, true, "a finite number")?;
+            let j = plant.joint(self.kind(), joint)?;
+            plant.direction(&[(j, 1.0)]).viscous += viscous;
+        }
+        Ok(())
+    }
+}
+
+/// One column: the joint's speed. Coefficient: b.
+pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
+    vec![Column::on(joint, motion.v[joint].clone(), -motion.model.joints()[joint].damping)]
+}

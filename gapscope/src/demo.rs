@@ -1,0 +1,131 @@
+//! `gapscope demo`: a robot with an effect that the diagnosis is not told, diagnosed from its log files, then revealed.
+
+use crate::cli::{Demo, Input};
+use crate::diagnose::{with_progress, write};
+use crate::input::load;
+use crate::{output, summary};
+use anyhow::{Context, Result};
+use gapscope_datasets::{Recipe, generate, write_csv};
+use gapscope_dynamics::{Model, robots};
+use gapscope_effects::{
+    Armature, CoulombFriction, Effect, GravityMisalignment, ParallelSpring, Payload, TorqueBias, TorqueGainError,
+    ViscousFriction,
+};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::io::IsTerminal;
+use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+const EPISODES: u64 = 4;
+
+/// Makes logs of an arm with a withheld effect, diagnoses them, then says what it was; returns what to print.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn run(args: &Demo) -> Result<String> {
+    let seed = args
+        .seed
+        .unwrap_or_else(|| SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |since| since.as_secs() % 100_000));
+    let out = match &args.out {
+        Some(out) => {
+            output::folder(Some(out), out, false)?;
+            out.clone()
+        }
+        None => output::new_folder(Path::new(""), "gapscope-demo")?,
+    };
+    let robot = robots::model("arm7").context("the 7-joint arm is built in")??.model;
+    let withheld = withheld(&robot, seed);
+    std::fs::create_dir_all(&out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    let urdf = out.join("robot.urdf");
+    output::write(&urdf, robots::arm7())?;
+    let mut logs = Vec::new();
+    for episode in 0..EPISODES {
+        let path = out.join(format!("episode_{episode}.csv"));
+        let recipe = Recipe { speed: [0.6, 1.0, 1.5, 1.0][episode as usize % 4], ..Recipe::default() };
+        let name = format!("episode_{episode}.csv");
+        write_csv(&path, &generate(&robot, &withheld, 1000 * seed + episode, &recipe, &name)?, true)?;
+        logs.push(path);
+    }
+    // From here on only the files count: the diagnosis reads what a user's robot would have left.
+    let input = Input {
+        robot: urdf.clone(),
+        logs: logs.clone(),
+        map: vec![],
+        map_file: None,
+        lock: vec![],
+        allow_truncated: false,
+        skip_bad_logs: false,
+    };
+    let mut outcome = with_progress(load(&input)?)?;
+    outcome.evidence.robot_file = urdf.display().to_string();
+    outcome.evidence.logs = logs.iter().map(|l| l.display().to_string()).collect();
+    write(&outcome, &out)?;
+    let color = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let mut text =
+        format!("A 7-joint arm moves with an effect that its model lacks; its logs are in {}.\n\n", out.display());
+    text.push_str(&summary::summary(&outcome.diagnosis, Some(&out.join("report.html")), color));
+    let _ = write!(text, "\nWithheld until now (gapscope demo --seed {seed}):\n{}", reveal(&withheld));
+    Ok(text)
+}
+
+/// One effect, drawn by seed.
+fn withheld(robot: &Model, seed: u64) -> Vec<Effect> {
+    let mut random = Pcg64::seed_from_u64(seed);
+    // Joints near the base carry more and rub more.
+    let size = [1.0, 1.0, 0.8, 0.8, 0.4, 0.4, 0.3];
+    let joints: Vec<(String, f64)> = robot.joints().iter().map(|j| j.name.clone()).zip(size).collect();
+    let some: Vec<(String, f64)> = {
+        let chosen: Vec<_> = joints.iter().filter(|_| random.random_bool(0.6)).cloned().collect();
+        if chosen.is_empty() { joints.clone() } else { chosen }
+    };
+    let mut each = |of: &[(String, f64)], low: f64, high: f64, signed: bool| -> BTreeMap<String, f64> {
+        of.iter()
+            .map(|(name, size)| {
+                let sign = if signed && random.random_bool(0.5) { -1.0 } else { 1.0 };
+                (name.clone(), (1000.0 * sign * size * random.random_range(low..high)).round() / 1000.0)
+            })
+            .collect()
+    };
+    let values = each(&some, 0.4, 1.5, false);
+    let biases = each(&some, 0.4, 1.5, true);
+    let one = some[0].clone();
+    let mut uniform = |low: f64, high: f64| (1000.0 * random.random_range(low..high)).round() / 1000.0;
+    let effect = match seed % 8 {
+        0 => Effect::CoulombFriction(CoulombFriction { coulomb: values }),
+        1 => Effect::Payload(Payload {
+            joint: joints.last().map(|j| j.0.clone()).unwrap_or_default(),
+            mass: uniform(0.5, 2.5),
+            com: [uniform(-0.05, 0.05), -0.02, uniform(0.08, 0.2)],
+            inertia: [0.002, 0.0, 0.002, 0.0, 0.0, 0.002],
+        }),
+        2 => Effect::ViscousFriction(ViscousFriction { viscous: values }),
+        3 => {
+            Effect::GravityMisalignment(GravityMisalignment { roll: uniform(0.02, 0.07), pitch: -uniform(0.02, 0.06) })
+        }
+        4 => Effect::Armature(Armature { armature: values.into_iter().map(|(j, v)| (j, 0.15 * v)).collect() }),
+        5 => Effect::ParallelSpring(ParallelSpring {
+            stiffness: [(one.0.clone(), one.1 * uniform(3.0, 8.0))].into(),
+            rest_position: [(one.0, uniform(-0.4, 0.4))].into(),
+        }),
+        6 => Effect::TorqueBias(TorqueBias { bias: biases }),
+        _ => Effect::TorqueGainError(TorqueGainError { gain: [(one.0, uniform(0.8, 0.94))].into() }),
+    };
+    vec![effect]
+}
+
+fn reveal(effects: &[Effect]) -> String {
+    let mut text = String::new();
+    for effect in effects {
+        let _ = writeln!(text, "  {}", effect.kind());
+        for p in effect.law().parameters() {
+            let joint = p.joint.map_or_else(String::new, |j| format!(" {j}"));
+            let values: Vec<String> = p.value.iter().map(|v| format!("{:.4}", v)).collect();
+            let unit = if p.unit == "-" { "" } else { p.unit };
+            let _ = writeln!(text, "    {}{joint}: {} {unit}", p.name, values.join(" "));
+        }
+    }
+    text
+}

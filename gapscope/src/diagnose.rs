@@ -1,0 +1,74 @@
+//! `gapscope diagnose`.
+
+use crate::cli::Diagnose;
+use crate::input::{Loaded, load};
+use crate::{output, report, summary};
+use anyhow::{Context, Result};
+use gapscope_diagnosis::{Outcome, diagnose};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::path::Path;
+
+/// Diagnoses and writes the results; returns what to print.
+///
+/// # Errors
+/// Bad input, or results that exist or cannot be written.
+pub fn run(args: &Diagnose) -> Result<String> {
+    let first = args.input.logs.first().context("no log is given")?;
+    let out = output::folder(args.out.as_deref(), first, args.force)?;
+    let progress = Progress::new();
+    progress.stage("reading robot and logs", 0.0);
+    let loaded = load(&args.input)?;
+    let mut outcome = diagnose(&loaded.model, &loaded.episodes, loaded.findings, &|s, p| progress.stage(s, p))?;
+    progress.finish();
+    outcome.evidence.robot_file = args.input.robot.display().to_string();
+    outcome.evidence.logs = args.input.logs.iter().map(|l| l.display().to_string()).collect();
+    write(&outcome, &out)?;
+    let color = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    Ok(summary::summary(&outcome.diagnosis, Some(&out.join("report.html")), color))
+}
+
+/// Diagnoses what is loaded, with progress on the terminal.
+///
+/// # Errors
+/// None that a log can cause.
+pub fn with_progress(loaded: Loaded) -> Result<Outcome> {
+    let progress = Progress::new();
+    let outcome = diagnose(&loaded.model, &loaded.episodes, loaded.findings, &|s, p| progress.stage(s, p))?;
+    progress.finish();
+    Ok(outcome)
+}
+
+/// Writes diagnosis.json, corrected.json and report.html into a folder.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write(outcome: &Outcome, out: &Path) -> Result<()> {
+    output::write(&out.join("diagnosis.json"), &serde_json::to_string_pretty(&outcome.diagnosis)?)?;
+    output::write(&out.join("corrected.json"), &outcome.corrected.to_json()?)?;
+    let mut evidence = outcome.evidence.clone();
+    evidence.corrected_file = out.join("corrected.json").display().to_string();
+    output::write(&out.join("report.html"), &report::html(&outcome.diagnosis, &evidence))
+}
+
+/// A bar on standard error where that is a terminal, nothing elsewhere.
+struct Progress(ProgressBar);
+
+impl Progress {
+    fn new() -> Progress {
+        let bar = ProgressBar::new(100);
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}") {
+            bar.set_style(style);
+        }
+        Progress(bar)
+    }
+
+    fn stage(&self, stage: &str, part: f64) {
+        self.0.set_position((100.0 * part) as u64);
+        self.0.set_message(stage.to_owned());
+    }
+
+    fn finish(&self) {
+        self.0.finish_and_clear();
+    }
+}

@@ -1,0 +1,192 @@
+//! The table of effects found: what, where, how sure, how much.
+
+use super::chart::short;
+use super::format::{self, percent, with_unit};
+use super::words;
+use gapscope_diagnosis::schema::{Diagnosis, Estimate, FoundEffect, Parameter};
+use maud::{Markup, html};
+use std::collections::BTreeMap;
+
+/// Most parameters whose intervals are drawn beside the figures.
+const DRAWN: usize = 3;
+
+/// The table, or a plain word where there is nothing in it.
+pub fn render(diagnosis: &Diagnosis) -> Markup {
+    if diagnosis.effects.is_empty() {
+        return html! { p.none { "None. " span.muted { (words::nothing_found(diagnosis.verdict)) } } };
+    }
+    html! {
+        table.effects {
+            caption.sr { "Effects found, strongest first" }
+            thead {
+                tr {
+                    th scope="col" { "effect" }
+                    th scope="col" { "joints" }
+                    th scope="col" { "confidence" }
+                    th.number scope="col" { "alone, torque gap shrinks by" }
+                    th scope="col" { "cannot be told from" }
+                }
+            }
+            @for effect in &diagnosis.effects { (row(effect, &diagnosis.joints)) }
+        }
+    }
+}
+
+fn row(effect: &FoundEffect, all: &[String]) -> Markup {
+    let apart: Vec<String> = effect.indistinguishable_from.iter().map(|kind| words::effect(kind)).collect();
+    html! {
+        tbody {
+            tr.effect {
+                th scope="row" {
+                    (words::capital(&words::effect(&effect.kind))) " " code { (effect.kind) }
+                    @let meaning = words::meaning(&effect.kind);
+                    @if !meaning.is_empty() { p.muted { (meaning) } }
+                }
+                td.joints data-label="joints" title=(effect.joints.join(", ")) { (words::joints(&effect.joints, all)) }
+                td.nowrap data-label="confidence" { (meter(effect.confidence)) " " (format::probability_figure(effect.confidence)) "\u{202f}%" }
+                td.number data-label="alone, torque gap shrinks by" {
+                    (effect.shrink.torque.map_or("at the floor".into(), percent))
+                }
+                td data-label="cannot be told from" {
+                    @if apart.is_empty() { span.muted { "nothing" } } @else { (apart.join(", ")) }
+                }
+            }
+            tr.parameters {
+                td colspan="5" {
+                    @if effect.parameters.is_empty() { span.muted { "no parameters" } } @else { (parameters(effect, all)) }
+                }
+            }
+        }
+    }
+}
+
+/// A small bar for a probability.
+pub fn meter(part: f64) -> Markup {
+    let part = if part.is_finite() { part.clamp(0.0, 1.0) } else { 0.0 };
+    html! { span.meter aria-hidden="true" { i style={ "width:" (short(100.0 * part)) "%" } {} } }
+}
+
+/// Parameters of one effect: joints in rows where each has its own, else one row for each number.
+fn parameters(effect: &FoundEffect, all: &[String]) -> Markup {
+    let by_joint: Vec<(&String, &BTreeMap<String, Estimate>)> = effect
+        .parameters
+        .iter()
+        .filter_map(|(name, p)| if let Parameter::PerJoint(map) = p { Some((name, map)) } else { None })
+        .collect();
+    let mut single: Vec<(&String, &Estimate)> = effect
+        .parameters
+        .iter()
+        .filter_map(|(name, p)| if let Parameter::Single(estimate) = p { Some((name, estimate)) } else { None })
+        .collect();
+    single.sort_by_key(|(_, estimate)| format::numbers(&estimate.value).len());
+    html! {
+        @if !by_joint.is_empty() { div.scroll { (joint_table(&by_joint, all)) } }
+        @if !single.is_empty() { div.scroll { (single_table(&single)) } }
+    }
+}
+
+fn joint_table(parameters: &[(&String, &BTreeMap<String, Estimate>)], all: &[String]) -> Markup {
+    let mut joints: Vec<&String> = parameters.iter().flat_map(|(_, map)| map.keys()).collect();
+    joints.sort_by_key(|joint| (all.iter().position(|j| j == *joint), joint.as_str()));
+    joints.dedup();
+    let drawn = parameters.len() <= DRAWN && joints.len() > 1;
+    html! {
+        table class={ "inner n" (parameters.len()) } {
+            thead {
+                tr {
+                    th scope="col" { "joint" }
+                    @for (name, _) in parameters { th.number scope="col" { (words::parameter(name)) span.muted { " [95 %]" } } @if drawn { td.interval {} } }
+                }
+            }
+            tbody {
+                @for joint in joints {
+                    tr {
+                        th scope="row" { span.name { (joint) } }
+                        @for (_, map) in parameters {
+                            td.number {
+                                @match map.get(joint) {
+                                    Some(estimate) => (cell(estimate)),
+                                    None => (format::NONE),
+                                }
+                            }
+                            @if drawn {
+                                td.interval aria-hidden="true" {
+                                    @if let Some(estimate) = map.get(joint) { (interval(estimate, reach(map))) }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Smallest and largest end of the intervals of a parameter, zero included.
+fn reach(map: &BTreeMap<String, Estimate>) -> [f64; 2] {
+    let ends = map.values().flat_map(|e| e.ci95.iter().chain([&e.value]).flat_map(format::numbers));
+    let ends = ends.filter(|v| v.is_finite());
+    ends.fold([0.0, 0.0], |[from, to], v| [f64::min(from, v), f64::max(to, v)])
+}
+
+/// A dot on its interval, on a scale that the joints share and that holds zero.
+fn interval(estimate: &Estimate, [from, to]: [f64; 2]) -> Markup {
+    let scalar = |q| {
+        if let [one] = format::numbers(q).as_slice() { Some(*one) } else { None }
+    };
+    let [Some(value), Some(low), Some(high)] = [&estimate.value, &estimate.ci95[0], &estimate.ci95[1]].map(scalar)
+    else {
+        return html! {};
+    };
+    if !(to > from && value.is_finite() && low.is_finite() && high.is_finite()) {
+        return html! {};
+    }
+    let at = |v: f64| format!("{}%", short(2.0 + 96.0 * (v - from) / (to - from)));
+    html! {
+        svg.dot-line width="100%" height="14" {
+            line.base x1=(at(0.0)) x2=(at(0.0)) y1="0" y2="100%" {}
+            line.whisker x1=(at(low)) x2=(at(high)) y1="7" y2="7" {}
+            circle cx=(at(value)) cy="7" r="3.2" {}
+        }
+    }
+}
+
+fn cell(estimate: &Estimate) -> Markup {
+    let printed = format::estimate(estimate);
+    html! {
+        b { (printed.value) } (with_unit("", &printed.unit))
+        @for interval in &printed.interval { " " span.muted.nowrap { (interval) } }
+    }
+}
+
+fn single_table(parameters: &[(&String, &Estimate)]) -> Markup {
+    html! {
+        table.inner {
+            thead {
+                tr {
+                    th scope="col" { "parameter" }
+                    th.number scope="col" { "value" }
+                    th.number scope="col" { "95 % interval" }
+                    th scope="col" { "unit" }
+                }
+            }
+            tbody {
+                @for (name, estimate) in parameters {
+                    @let printed = format::estimate(estimate);
+                    @let several = printed.components.len();
+                    @for (i, (value, interval)) in printed.components.iter().zip(&printed.interval).enumerate() {
+                        tr {
+                            th scope="row" {
+                                (words::parameter(name))
+                                @if several > 1 { " " i { (words::component(name, i, several)) } }
+                            }
+                            td.number { b { (value) } }
+                            td.number { (interval) }
+                            td.nowrap { (with_unit("", &printed.unit).trim()) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

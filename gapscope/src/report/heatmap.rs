@@ -1,0 +1,138 @@
+//! The gap by joint and regime: a table whose cells are shaded by share.
+
+use super::format::{NONE, fixed, percent, percent_interval};
+use super::words;
+use gapscope_diagnosis::schema::Regime;
+use maud::{Markup, html};
+
+/// Columns under one regime's name.
+struct Group<'a> {
+    name: &'a str,
+    columns: Vec<Column<'a>>,
+}
+
+/// One regime with one set of bounds; where bounds differ between joints, the n-th of its name.
+struct Column<'a> {
+    /// Bounds for the heading.
+    heading: String,
+    /// One cell for each joint.
+    cells: Vec<Option<&'a Regime>>,
+}
+
+/// The heat map, or a sentence where there is nothing to show; `whole` says what the shares are parts of.
+pub fn render(joints: &[String], regimes: &[Regime], caption: &str, whole: &str) -> Markup {
+    let joints: Vec<&String> = joints.iter().filter(|joint| regimes.iter().any(|r| r.joint == **joint)).collect();
+    let groups = groups(&joints, regimes);
+    if groups.is_empty() || joints.is_empty() {
+        return html! { p.muted { "No regimes were evaluated." } };
+    }
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(caption) {
+            table.heat {
+                caption.sr { (caption) }
+                thead {
+                    tr {
+                        th.corner rowspan="2" scope="col" { "joint" }
+                        @for group in &groups {
+                            th.group colspan=(group.columns.len()) scope="colgroup" { (words::regime(group.name)) }
+                        }
+                    }
+                    tr {
+                        @for group in &groups {
+                            @for (i, column) in group.columns.iter().enumerate() {
+                                th.bounds.first[i == 0] scope="col" { (column.heading) }
+                            }
+                        }
+                    }
+                }
+                tbody {
+                    @for (row, joint) in joints.iter().enumerate() {
+                        tr {
+                            th scope="row" { span { (joint) } }
+                            @for group in &groups {
+                                @for (i, column) in group.columns.iter().enumerate() {
+                                    (cell(column.cells.get(row).copied().flatten(), i == 0))
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        (legend(whole))
+    }
+}
+
+fn cell(regime: Option<&Regime>, first: bool) -> Markup {
+    let Some(regime) = regime else {
+        return html! { td.empty.first[first] { (NONE) } };
+    };
+    let marked = words::stands_out(regime);
+    let shade = if regime.share.is_finite() { regime.share.clamp(0.0, 1.0) } else { 0.0 };
+    let tip = format!(
+        "{}, {}: {} of the squared gap (95 %: {}), {} of the samples",
+        regime.joint,
+        words::regime_phrase(regime),
+        percent(regime.share),
+        percent_interval(regime.ci95),
+        percent(regime.samples),
+    );
+    html! {
+        td.marked[marked] .first[first] style={ "--a:" (super::chart::short(shade)) } title=(tip) {
+            (whole_percent(regime.share))
+            @if marked && regime.samples > 0.0 {
+                small { (super::format::significant(regime.share / regime.samples, 2)) "×" }
+            }
+        }
+    }
+}
+
+/// Percent without decimals, as the cells are small.
+fn whole_percent(share: f64) -> String {
+    if share > 0.0 && share < 0.005 { "<1".into() } else { fixed(100.0 * share, 0) }
+}
+
+fn legend(whole: &str) -> Markup {
+    html! {
+        p.legend {
+            span.ramp aria-hidden="true" { "0" i {} "100" }
+            " share of " (whole) ", %. "
+            span.key aria-hidden="true" { "62" small { "7.8×" } }
+            " framed: the regime holds at least 1.5 times its part of the samples, and its whole 95 % interval lies above; "
+            "the small figure is share ÷ samples. Regimes overlap, so a row does not add up to 100."
+        }
+    }
+}
+
+/// Regimes sorted into columns, in the order in which the diagnosis names them.
+fn groups<'a>(joints: &[&String], regimes: &'a [Regime]) -> Vec<Group<'a>> {
+    let mut names: Vec<&str> = vec![];
+    for regime in regimes {
+        if !names.contains(&regime.regime.as_str()) {
+            names.push(&regime.regime);
+        }
+    }
+    names.into_iter().map(|name| Group { name, columns: columns(name, joints, regimes) }).collect()
+}
+
+fn columns<'a>(name: &str, joints: &[&String], regimes: &'a [Regime]) -> Vec<Column<'a>> {
+    let rows: Vec<Vec<&Regime>> = joints
+        .iter()
+        .map(|joint| regimes.iter().filter(|r| r.regime == name && r.joint == **joint).collect())
+        .collect();
+    let count = rows.iter().map(Vec::len).max().unwrap_or(0);
+    (0..count)
+        .map(|i| {
+            let cells: Vec<Option<&Regime>> = rows.iter().map(|row| row.get(i).copied()).collect();
+            let mut bounds: Vec<_> = cells.iter().flatten().map(|r| &r.bounds).collect();
+            bounds.dedup();
+            let heading = match bounds.as_slice() {
+                [one] => words::interval(one).replace('–', "–\u{2060}").replace('\u{a0}', " "),
+                _ if count > 1 => format!("{} of {count}", i + 1),
+                [one, ..] => format!("{}, by joint", one.quantity.replace('_', " ")),
+                [] => String::new(),
+            };
+            Column { heading, cells }
+        })
+        .collect()
+}

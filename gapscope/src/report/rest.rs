@@ -1,0 +1,175 @@
+//! What follows the figures: what is left, alternatives, the next experiment, the data, and how to check it all.
+
+use super::effects::meter;
+use super::format::{NONE, count, figure, group, percent, plain, with_unit};
+use super::{heatmap, words};
+use gapscope_diagnosis::schema::{Diagnosis, Evidence, Gap, Verdict};
+use maud::{Markup, html};
+
+/// What is left after the effects, and where.
+pub fn unexplained(diagnosis: &Diagnosis) -> Markup {
+    let left = &diagnosis.unexplained;
+    let outstanding = words::outstanding(&left.regimes);
+    html! {
+        @if matches!(diagnosis.verdict, Verdict::NoGap | Verdict::NotExcited) {
+            p { (words::verdict_meaning(diagnosis.verdict)) }
+        } @else {
+            p {
+                @if left.fraction > 0.0 {
+                    b { (percent(left.fraction)) } " of the squared torque gap is left above the noise floor"
+                    @if diagnosis.effects.is_empty() { ", since no effect was found" } @else { " after the effects" }
+                    @if let Some(first) = outstanding.first() {
+                        "; most clearly at " (first.joint) " " (words::regime_phrase(first)) ", with " (percent(first.share)) " of what is left there"
+                    }
+                    "."
+                } @else {
+                    "Nothing above the noise floor."
+                }
+            }
+            @if left.fraction > 0.0 && !left.regimes.is_empty() {
+                (heatmap::render(&diagnosis.joints, &left.regimes, "What is left, by joint and regime", "what is left at the joint"))
+            }
+        }
+    }
+}
+
+/// Other sets of effects that the logs do not exclude.
+pub fn alternatives(diagnosis: &Diagnosis) -> Markup {
+    if diagnosis.alternatives.is_empty() {
+        let text = match diagnosis.verdict {
+            Verdict::NotExcited => "The logs do not tell.",
+            _ => "None: no other set of effects of the catalogue comes near.",
+        };
+        return html! { p { (text) } };
+    }
+    html! {
+        table.plain {
+            thead { tr { th scope="col" { "instead" } th scope="col" { "probability" } } }
+            tbody {
+                @for alternative in &diagnosis.alternatives {
+                    @let names: Vec<String> = alternative.effects.iter().map(|kind| words::effect(kind)).collect();
+                    tr {
+                        td { @if names.is_empty() { "no effect at all" } @else { (words::capital(&names.join(" + "))) } }
+                        td.nowrap { (meter(alternative.probability)) " " (percent(alternative.probability)) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The motion that would tell more.
+pub fn next_experiment(diagnosis: &Diagnosis) -> Markup {
+    let Some(next) = &diagnosis.next_experiment else {
+        let text = match diagnosis.verdict {
+            Verdict::NoGap | Verdict::Explained => "None needed: these logs leave nothing to separate.",
+            _ => "None proposed.",
+        };
+        return html! { p { (text) } };
+    };
+    let kinds: Vec<String> = next.separates.iter().map(|kind| words::effect(kind)).collect();
+    html! {
+        div.callout {
+            p { b { (next.motion) } }
+            p { (next.why) }
+            @if !kinds.is_empty() { p.muted { "Tells apart: " (words::list(&kinds, "and")) "." } }
+        }
+    }
+}
+
+/// What was read, and what was odd in it.
+pub fn data(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
+    let data = &diagnosis.data;
+    html! {
+        dl.facts {
+            div { dt { "robot" } dd { (diagnosis.robot) ", " (count(diagnosis.joints.len(), "joint")) } }
+            div { dt { "episodes" } dd { (group(data.episodes)) } }
+            div { dt { "samples" } dd { (group(data.samples)) } }
+            div { dt { "length" } dd { (with_unit(&plain(data.duration), "s")) } }
+            div { dt { "rate" } dd { (with_unit(&plain(data.rate), "Hz")) } }
+            div { dt { "torque compared below" } dd { (with_unit(&plain(data.band), "Hz")) } }
+        }
+        h3 { "Findings" }
+        @if data.findings.is_empty() {
+            p { "None: nothing odd in the robot description or the logs." }
+        } @else {
+            ul.findings { @for finding in &data.findings { li { (finding) } } }
+        }
+        details {
+            summary { "The gap by joint in SI units" }
+            (figures(diagnosis, evidence))
+        }
+    }
+}
+
+/// Gap of every joint in its own units, before and, where known, after.
+fn figures(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
+    let gap = &diagnosis.gap;
+    let after = evidence.remaining.as_ref();
+    html! {
+        div.scroll tabindex="0" role="region" aria-label="The gap by joint in SI units" {
+            table.inner.figures {
+                thead {
+                    tr {
+                        th scope="col" { "joint" }
+                        th.number scope="col" { "one step, position" }
+                        th.number scope="col" { "one step, velocity" }
+                        @for rollout in &gap.rollout {
+                            th.number scope="col" { "rollout " (with_unit(&plain(rollout.horizon), "s")) ", position" }
+                        }
+                    }
+                }
+                tbody {
+                    @for joint in &diagnosis.joints {
+                        @let unit = words::position_unit(joint, evidence, &gap.regimes);
+                        tr {
+                            th scope="row" { (joint) }
+                            td.number { (pair(gap, after, unit, |g| g.one_step.position.get(joint).copied())) }
+                            td.number { (pair(gap, after, &format!("{unit}/s"), |g| g.one_step.velocity.get(joint).copied())) }
+                            @for i in 0..gap.rollout.len() {
+                                td.number { (pair(gap, after, unit, |g| g.rollout.get(i)?.position.get(joint).copied())) }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        p.note { "Rms of the model as described" @if after.is_some() { " → with the effects" } ", held-out data." }
+    }
+}
+
+fn pair(before: &Gap, after: Option<&Gap>, unit: &str, pick: impl Fn(&Gap) -> Option<f64>) -> String {
+    let Some(first) = pick(before) else {
+        return NONE.into();
+    };
+    match after.and_then(&pick) {
+        Some(second) => format!("{} → {}", figure(first), with_unit(&figure(second), unit)),
+        None => with_unit(&figure(first), unit),
+    }
+}
+
+/// Commands that check the figures on other logs.
+pub fn reproduce(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
+    let or = |text: &str, otherwise: &str| {
+        if text.is_empty() { otherwise.to_string() } else { quote(text) }
+    };
+    let robot = or(&evidence.robot_file, "ROBOT.urdf");
+    let corrected = or(&evidence.corrected_file, "corrected.json");
+    let logs: Vec<String> = evidence.logs.iter().map(|log| quote(log)).collect();
+    let logs = if logs.is_empty() { "LOG...".into() } else { logs.join(" ") };
+    let with = html! { @if !diagnosis.effects.is_empty() { " " span.nowrap { "--with " (corrected) } } };
+    html! {
+        p { "The same figures on logs that this diagnosis has not seen:" }
+        pre { code { "gapscope evaluate " (robot) " OTHER_LOG..." (with) } }
+        p { "Measured, nominal and corrected torque of every sample, to check the figures by other means:" }
+        pre { code { "gapscope evaluate " (robot) " " (logs) (with) " " span.nowrap { "--predictions predictions.csv" } } }
+        p { "This report and " code { "diagnosis.json" } " again:" }
+        pre { code { "gapscope diagnose " (robot) " " (logs) } }
+    }
+}
+
+/// A word as a shell takes it.
+fn quote(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@".contains(c);
+    if text.chars().all(plain) { text.into() } else { format!("'{}'", text.replace('\'', r"'\''")) }
+}

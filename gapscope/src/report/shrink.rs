@@ -1,0 +1,155 @@
+//! How far the gap shrinks: figures, references, and the error over the horizon.
+
+use super::axis::{Axis, extent};
+use super::bars::{self, Bar};
+use super::chart::{Plot, band, dots, line};
+use super::format::{NONE, figure, percent, percent_interval, plain};
+use super::words;
+use gapscope_diagnosis::schema::{Change, Diagnosis, HorizonChange, Regime, Shrink};
+use maud::{Markup, html};
+
+/// Table, references and horizon plot.
+pub fn render(diagnosis: &Diagnosis) -> Markup {
+    let shrink = &diagnosis.shrink;
+    let regimes = &diagnosis.gap.regimes;
+    let corrected = !diagnosis.effects.is_empty();
+    html! {
+        div.grid-two.top {
+            div { (table(shrink, regimes, corrected)) }
+            div { (references(shrink, corrected)) (horizon(&shrink.rollout, regimes, corrected)) }
+        }
+    }
+}
+
+fn table(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Markup {
+    let (position, velocity) = (words::motion_unit(regimes, false), words::motion_unit(regimes, true));
+    let row = |name: &str, of: &str, change: &Change| {
+        html! {
+            tr {
+                th scope="row" { span.nowrap { (name) } @if !of.is_empty() { span.wide { ", " (of) } } }
+                td.number { (figure(change.gaps()[0])) }
+                @if corrected {
+                    td.number { (figure(change.gaps()[1])) }
+                    td.number { b { (change.shrink.map_or("at the floor".into(), percent)) } }
+                    td.number { (change.ci95.map_or(NONE.into(), percent_interval)) }
+                }
+            }
+        }
+    };
+    html! {
+        div.scroll { table.plain {
+            caption { "Rms over the joints, held-out data" }
+            thead {
+                tr {
+                    th scope="col" { "gap in" }
+                    th.number scope="col" { "before" }
+                    @if corrected {
+                        th.number scope="col" { "after" }
+                        th.number scope="col" { "shrinks by" }
+                        th.number scope="col" { "95 %" }
+                    }
+                }
+            }
+            tbody {
+                (row("torque", "of effort std", &shrink.torque))
+                (row("one step", velocity, &shrink.one_step))
+                @for h in &shrink.rollout { (row(&format!("rollout {} s", plain(h.horizon)), position, &h.change)) }
+            }
+        } }
+        p.note { (NOTE) }
+    }
+}
+
+/// How the joints are put together.
+const NOTE: &str = "Torque: each joint’s rms is divided by the standard deviation of its effort in these logs (w = 1/std) \
+    before the joints are averaged as squares, so 0.1 is a tenth of the effort’s spread. One step and rollouts: rms over \
+    the joints that move. Figures by joint stand under Data.";
+
+fn references(shrink: &Shrink, corrected: bool) -> Markup {
+    let torque = &shrink.torque;
+    let after = torque.ci95.map(|[low, high]| [torque.gaps()[0] * (1.0 - high), torque.gaps()[0] * (1.0 - low)]);
+    let mut rows: Vec<(&str, f64, Option<[f64; 2]>, &'static str)> =
+        vec![("model as described", torque.gaps()[0], None, "before")];
+    if corrected {
+        rows.push(("with the effects", torque.gaps()[1], after, "after"));
+    }
+    rows.extend(shrink.reference.residual_network.map(|v| ("model + residual network", v, None, "other")));
+    rows.extend(shrink.reference.pure_network.map(|v| ("network alone", v, None, "other")));
+    let floor = shrink.reference.noise_floor;
+    let top = 1.02 * bars::reach(rows.iter().flat_map(|r| [r.1, r.2.map_or(0.0, |e| e[1])]).chain([floor]));
+    html! {
+        div.rows.three role="table" aria-label="Torque gap beside the references" {
+            div.row.head role="row" {
+                span role="columnheader" { "torque gap, part of the effort’s spread" }
+                span role="columnheader" {}
+                span role="columnheader" { "rms" }
+            }
+            @for (name, value, interval, class) in rows {
+                div.row role="row" {
+                    span.name role="rowheader" { (name) }
+                    span.bar role="cell" {
+                        (bars::render(&[Bar { value, interval, class }], Some(floor), top, &format!("{name}: {}", figure(value))))
+                    }
+                    span.number role="cell" { (figure(value)) }
+                }
+            }
+            div.row role="row" {
+                span.name role="rowheader" { span.swatch.floor {} " noise floor" }
+                span.bar role="cell" {}
+                span.number role="cell" { (figure(floor)) }
+            }
+        }
+    }
+}
+
+/// Error of open-loop rollouts over the horizon, with the interval of the corrected model.
+fn horizon(rollout: &[HorizonChange], regimes: &[Regime], corrected: bool) -> Markup {
+    let title = format!("position error, {} rms", words::motion_unit(regimes, false));
+    if rollout.is_empty() {
+        return html! { p.muted { "No rollouts were evaluated." } };
+    }
+    let places: Vec<f64> = rollout.iter().map(|h| h.horizon).collect();
+    let ends: Vec<[f64; 3]> = rollout
+        .iter()
+        .filter_map(|h| {
+            let [low, high] = h.change.ci95?;
+            Some([h.horizon, h.change.gaps()[0] * (1.0 - high), h.change.gaps()[0] * (1.0 - low)])
+        })
+        .collect();
+    let before: Vec<[f64; 2]> = rollout.iter().map(|h| [h.horizon, h.change.gaps()[0]]).collect();
+    let after: Vec<[f64; 2]> =
+        if corrected { rollout.iter().map(|h| [h.horizon, h.change.gaps()[1]]).collect() } else { vec![] };
+    let x = Axis::places(&places, "horizon, s");
+    let values = before.iter().chain(&after).map(|p| p[1]).chain(ends.iter().flat_map(|e| [e[1], e[2]]));
+    let values: Vec<f64> = values.collect();
+    let (least, most) = extent(values.iter().copied());
+    let y = if least > 0.0 && most / least > 30.0 {
+        Axis::powers(values, &title)
+    } else {
+        Axis::wide(values.into_iter().chain([0.0]), &title, 4)
+    };
+    html! {
+        figure.horizon {
+            figcaption {
+                b { "Error of open-loop rollouts over the horizon" }
+                span.legend {
+                    span.swatch.before {} " before"
+                    @if corrected { span.swatch.after {} " after, with 95 % interval" }
+                }
+            }
+            (Plot {
+                description: "Position error of open-loop rollouts over the horizon, before and after".into(),
+                marks: html! {
+                    @if corrected && ends.len() > 1 { (band(&ends, &x, &y, "after")) }
+                    (line(before.iter().copied(), &[], &x, &y, "before thick"))
+                    (dots(before.iter().copied(), &x, &y, "before"))
+                    @if corrected {
+                        (line(after.iter().copied(), &[], &x, &y, "after thick"))
+                        (dots(after.iter().copied(), &x, &y, "after"))
+                    }
+                },
+                x: x.clone(), y: y.clone(), class: "high", rules: vec![], x_labels: true,
+            }.render())
+        }
+    }
+}

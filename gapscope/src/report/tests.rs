@@ -1,0 +1,170 @@
+//! The page as a whole: well formed, escaped, finite, small, and the same every time.
+
+use super::*;
+use gapscope_diagnosis::schema::FoundEffect;
+use gapscope_diagnosis::schema::Parameter;
+
+/// Elements that HTML closes by itself.
+const VOID: [&str; 4] = ["meta", "input", "br", "link"];
+
+/// Fails where an element is not closed or an attribute is not quoted.
+fn check_balance(name: &str, page: &str) {
+    assert!(page.starts_with("<!DOCTYPE html>") && page.ends_with('>'), "{name}");
+    let body = page.strip_prefix("<!DOCTYPE html>").unwrap_or_default();
+    let mut open: Vec<&str> = vec![];
+    let mut rest = body;
+    while let Some(start) = rest.find('<') {
+        let tag = &rest[start + 1..];
+        let end = tag.find('>').unwrap_or(tag.len() - 1);
+        let inside = &tag[..end];
+        assert_eq!(inside.matches('"').count() % 2, 0, "{name}: quotes in <{inside}>");
+        assert!(!inside.contains('<'), "{name}: < in <{inside}>");
+        if let Some(closing) = inside.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(closing), "{name}: </{closing}>");
+        } else {
+            let element = inside.split_whitespace().next().unwrap_or_default();
+            if !VOID.contains(&element) {
+                open.push(element);
+            }
+        }
+        rest = &tag[end + 1..];
+    }
+    assert!(open.is_empty(), "{name}: left open {open:?}");
+}
+
+#[test]
+fn every_verdict_is_well_formed_finite_small_and_repeatable() {
+    for (name, diagnosis, evidence) in sample::all() {
+        let page = html(&diagnosis, &evidence);
+        check_balance(name, &page);
+        for word in ["NaN", "inf<", ">inf", " inf ", "\"inf", "undefined", "None<", "Some("] {
+            assert!(!page.contains(word), "{name}: {word}");
+        }
+        assert!(page.len() < 2_000_000, "{name}: {} bytes", page.len());
+        assert_eq!(page, html(&diagnosis, &evidence), "{name}");
+        assert!(
+            page.contains(words::verdict(diagnosis.verdict))
+                && page.contains(words::verdict_meaning(diagnosis.verdict))
+        );
+        for word in ["http://", "https://", "<script", "src=", "@import", "url("] {
+            assert!(!page.contains(word), "{name}: {word} would reach out");
+        }
+        if let Ok(folder) = std::env::var("GAPSCOPE_SAMPLE_REPORTS") {
+            std::fs::write(std::path::Path::new(&folder).join(format!("{name}.html")), &page).ok();
+        }
+    }
+}
+
+#[test]
+fn holds_every_effect_of_the_catalogue() {
+    let kinds = [
+        "viscous_friction",
+        "coulomb_friction",
+        "stribeck_friction",
+        "load_dependent_friction",
+        "presliding_friction",
+        "thermal_drift",
+        "payload",
+        "link_inertia_error",
+        "armature",
+        "gravity_misalignment",
+        "torque_gain_error",
+        "torque_bias",
+        "actuation_delay",
+        "actuator_lag",
+        "torque_saturation",
+        "torque_ripple",
+        "joint_elasticity",
+        "backlash",
+        "parallel_spring",
+        "joint_zero_offset",
+        "external_contact",
+        "joint_coupling",
+        "from_a_later_version",
+    ];
+    let (_, mut diagnosis, evidence) = sample::explained();
+    let pattern = diagnosis.effects[0].clone();
+    diagnosis.effects = kinds.iter().map(|kind| FoundEffect { kind: (*kind).into(), ..pattern.clone() }).collect();
+    let page = html(&diagnosis, &evidence);
+    check_balance("catalogue", &page);
+    for kind in kinds {
+        assert!(page.contains(&format!("<code>{kind}</code>")), "{kind}");
+        assert!(page.contains(&words::capital(&words::effect(kind))), "{kind}");
+        assert!(kind == "from_a_later_version" || !words::meaning(kind).is_empty(), "{kind}");
+    }
+}
+
+#[test]
+fn escapes_names() {
+    let (_, diagnosis, evidence) = sample::no_gap();
+    let page = html(&diagnosis, &evidence);
+    assert!(page.contains("&lt;script&gt;alert(1)&lt;/script&gt;"));
+    assert!(page.contains("arm &lt;b&gt;&amp;amp; &quot;co&quot;&lt;/b&gt;"));
+    let (_, mut diagnosis, mut evidence) = sample::explained();
+    let bad = "a\"><script>alert(1)</script>'&";
+    diagnosis.data.findings.push(bad.into());
+    diagnosis.effects[0].kind = bad.into();
+    diagnosis.gap.regimes[0].regime = bad.into();
+    diagnosis.gap.regimes[1].bounds.unit = bad.into();
+    evidence.curves[0].x_label = bad.into();
+    evidence.torque[0].unit = bad.into();
+    evidence.logs.push(bad.into());
+    let page = html(&diagnosis, &evidence);
+    check_balance("bad names", &page);
+    assert!(!page.contains("<script"));
+}
+
+#[test]
+fn shows_units_and_intervals() {
+    let (_, diagnosis, evidence) = sample::explained();
+    let page = html(&diagnosis, &evidence);
+    for part in [
+        "<b>1.51</b>\u{a0}N\u{a0}m",
+        "[1.47,\u{a0}1.55]",
+        "4.20\u{a0}ms",
+        "speed, rad/s",
+        "torque, N m",
+        "horizon, s",
+        "time, s",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    let (_, diagnosis, evidence) = sample::prismatic();
+    let page = html(&diagnosis, &evidence);
+    assert!(page.contains("torque, N<") && !page.contains("N\u{a0}m") && !page.contains("rad/s"));
+}
+
+#[test]
+fn bad_figures_print_as_dashes() {
+    let (_, mut diagnosis, mut evidence) = sample::explained();
+    diagnosis.gap.torque.rms.insert("panda_joint1".into(), f64::NAN);
+    diagnosis.gap.torque.ci95.insert("panda_joint2".into(), [f64::NEG_INFINITY, f64::NAN]);
+    diagnosis.gap.regimes[0].share = f64::NAN;
+    diagnosis.shrink.torque.shrink = Some(f64::NAN);
+    diagnosis.shrink.rollout[0].change.before = Some(f64::INFINITY);
+    diagnosis.effects[0].confidence = f64::NAN;
+    if let Some(Parameter::PerJoint(map)) = diagnosis.effects[0].parameters.get_mut("coulomb") {
+        map.values_mut().for_each(|e| e.value = gapscope_diagnosis::schema::Quantity::Vector(vec![]));
+    }
+    evidence.torque[0].measured[5] = f64::NAN;
+    evidence.curves[0].data[3] = [f64::NAN, f64::INFINITY];
+    evidence.curves[1].law.clear();
+    let page = html(&diagnosis, &evidence);
+    check_balance("bad figures", &page);
+    assert!(!page.contains("NaN") && !page.contains("inf%") && !page.contains("\"inf"));
+}
+
+#[test]
+fn very_long_logs_stay_small() {
+    let (_, diagnosis, mut evidence) = sample::explained();
+    for series in &mut evidence.torque {
+        let long = |values: &Vec<f64>| values.iter().copied().cycle().take(200_000).collect::<Vec<f64>>();
+        series.measured = long(&series.measured);
+        series.nominal = long(&series.nominal);
+        series.corrected = long(&series.corrected);
+        series.time = (0..200_000).map(|i| i as f64 * 0.002).collect();
+        series.breaks = (1..200).map(|i| 1000 * i).collect();
+    }
+    let page = html(&diagnosis, &evidence);
+    assert!(page.len() < 2_000_000, "{} bytes", page.len());
+}

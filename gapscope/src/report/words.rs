@@ -1,0 +1,305 @@
+//! The catalogue, the verdicts and the regimes in words, and joint names made short.
+
+use super::format::{self, plain, with_unit};
+use gapscope_diagnosis::schema::{Bounds, Evidence, Regime, Verdict};
+
+/// An effect's public name in words, lower case but for names of people.
+pub fn effect(kind: &str) -> String {
+    match kind {
+        "coulomb_friction" => "Coulomb friction".into(),
+        "stribeck_friction" => "Stribeck friction".into(),
+        "load_dependent_friction" => "load-dependent friction".into(),
+        "link_inertia_error" => "link mass or inertia error".into(),
+        "armature" => "rotor inertia (armature)".into(),
+        "gravity_misalignment" => "tilted base".into(),
+        "torque_gain_error" => "torque gain error".into(),
+        "parallel_spring" => "spring across the joint".into(),
+        "joint_zero_offset" => "encoder zero offset".into(),
+        "joint_coupling" => "joint coupling".into(),
+        other => other.replace('_', " "),
+    }
+}
+
+/// What the real robot does that the model does not, in one clause; empty for kinds outside the catalogue.
+pub fn meaning(kind: &str) -> &'static str {
+    match kind {
+        "viscous_friction" => "friction that grows with speed",
+        "coulomb_friction" => "constant friction against the motion; sticks at rest",
+        "stribeck_friction" => "dry friction that rises towards standstill",
+        "load_dependent_friction" => "friction that grows with the torque through the gear",
+        "presliding_friction" => "friction that is elastic before it slides",
+        "thermal_drift" => "friction that falls as the drive warms up",
+        "payload" => "a body at the flange that the model does not carry",
+        "link_inertia_error" => "a link's mass, centre of mass or inertia differs from the URDF",
+        "armature" => "rotor inertia behind the gear",
+        "gravity_misalignment" => "the base is not level, so gravity points elsewhere",
+        "torque_gain_error" => "the drive delivers a multiple of the effort logged",
+        "torque_bias" => "a constant effort is added to the one logged",
+        "actuation_delay" => "effort acts later than logged",
+        "actuator_lag" => "effort follows the log with a first-order lag",
+        "torque_saturation" => "the drive clips effort below what was logged",
+        "torque_ripple" => "effort that repeats with position: cogging or gear mesh",
+        "joint_elasticity" => "a spring between motor and link",
+        "backlash" => "play between motor and link",
+        "parallel_spring" => "a spring, cable or counterbalance across the joint",
+        "joint_zero_offset" => "the encoder's zero is off",
+        "external_contact" => "an outside force for some of the time",
+        "joint_coupling" => "friction or inertia on a sum of two joint speeds",
+        _ => "",
+    }
+}
+
+/// A parameter's public name in words.
+pub fn parameter(name: &str) -> String {
+    match name {
+        "coulomb" => "Coulomb friction".into(),
+        "static" => "static friction".into(),
+        "viscous" => "viscous friction".into(),
+        "stribeck_velocity" => "Stribeck velocity".into(),
+        "com" => "centre of mass".into(),
+        "gap" => "play".into(),
+        "armature" => "rotor inertia".into(),
+        "cycles" => "cycles per turn".into(),
+        other => other.replace('_', " "),
+    }
+}
+
+/// A parameter's name before its value, unless the effect's name says it already.
+pub fn said_of(kind: &str, name: &str, value: &str) -> String {
+    let name = parameter(name);
+    if effect(kind).contains(&name) { value.into() } else { format!("{name} {value}") }
+}
+
+/// Names of a vector's components: x, y, z; or those of an inertia.
+pub fn component(name: &str, index: usize, of: usize) -> String {
+    let names: &[&str] = match (name, of) {
+        (_, 3) => &["x", "y", "z"],
+        (_, 6) => &["xx", "xy", "yy", "xz", "yz", "zz"],
+        ("intervals", 2) => &["from", "to"],
+        _ => &[],
+    };
+    names.get(index).map_or_else(|| (index + 1).to_string(), |n| (*n).to_string())
+}
+
+/// A verdict's label.
+pub fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NoGap => "No gap",
+        Verdict::Explained => "Explained",
+        Verdict::PartlyExplained => "Partly explained",
+        Verdict::UnknownEffect => "Unknown effect",
+        Verdict::NotExcited => "Not enough motion",
+    }
+}
+
+/// What a verdict means.
+pub fn verdict_meaning(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NoGap => "Model and robot agree to within the noise of these logs.",
+        Verdict::Explained => "The effects named here account for the gap between model and robot.",
+        Verdict::PartlyExplained => {
+            "The effects named here account for part of the gap; something outside the catalogue is left."
+        }
+        Verdict::UnknownEffect => "There is a gap, and no effect that I know explains it.",
+        Verdict::NotExcited => "The logs are too short or too still to tell.",
+    }
+}
+
+/// Why the list of effects is empty.
+pub fn nothing_found(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NoGap => "No effect is needed: the nominal model fits to within the noise.",
+        Verdict::UnknownEffect => "Nothing that I know explains this gap: every effect of the catalogue was tried.",
+        Verdict::NotExcited => "These logs cannot show one effect or another.",
+        Verdict::Explained | Verdict::PartlyExplained => "No effect was reported.",
+    }
+}
+
+/// A regime in words, as a heading.
+pub fn regime(name: &str) -> String {
+    name.replace('_', " ")
+}
+
+/// A regime with its bounds for a sentence: `at reversals (speed up to 0.05 rad/s)`.
+pub fn regime_phrase(regime: &Regime) -> String {
+    let place = match regime.regime.as_str() {
+        "standstill" => "at standstill",
+        "reversal" => "at reversals",
+        "low_speed" => "at low speed",
+        "high_speed" => "at high speed",
+        "high_load" => "under high load",
+        "high_acceleration" => "at high acceleration",
+        "pose" => "in one range of poses",
+        "frequency_band" => "in one frequency band",
+        "time" => "in one stretch of time",
+        other => {
+            return format!("in the regime “{}” ({})", self::regime(other), bounds(&regime.bounds));
+        }
+    };
+    match bounds(&regime.bounds) {
+        text if text.is_empty() => place.into(),
+        text => format!("{place} ({text})"),
+    }
+}
+
+/// Bounds with quantity and unit: `speed 0–0.05 rad/s`; empty where both ends are open.
+pub fn bounds(bounds: &Bounds) -> String {
+    match interval(bounds) {
+        text if text.is_empty() => text,
+        text => format!("{} {text}", bounds.quantity.replace('_', " ")).trim().to_string(),
+    }
+}
+
+/// Bounds without the quantity: `0–0.05 rad/s`, `> 1.2 rad/s`.
+pub fn interval(bounds: &Bounds) -> String {
+    let text = match bounds.interval {
+        [None, None] => return String::new(),
+        [Some(from), None] => format!(">\u{a0}{}", plain(from)),
+        [None, Some(to)] => format!("<\u{a0}{}", plain(to)),
+        [Some(from), Some(to)] => format::range(&plain(from), &plain(to)),
+    };
+    with_unit(&text, &bounds.unit)
+}
+
+/// Whether a regime carries clearly more of the gap than of the samples: at least half as much again, with the whole
+/// interval above, and a tenth of the gap or more.
+pub fn stands_out(regime: &Regime) -> bool {
+    regime.share >= 0.1 && regime.share >= 1.5 * regime.samples && regime.ci95[0] > regime.samples
+}
+
+/// Regimes that stand out, the largest surplus of gap over samples first; frequency bands last, as most of any motion
+/// is slow and the lowest band nearly always stands out.
+pub fn outstanding(regimes: &[Regime]) -> Vec<&Regime> {
+    let mut list: Vec<&Regime> = regimes.iter().filter(|r| stands_out(r)).collect();
+    let band = |r: &Regime| r.regime == "frequency_band";
+    list.sort_by(|a, b| band(a).cmp(&band(b)).then((b.share - b.samples).total_cmp(&(a.share - a.samples))));
+    list
+}
+
+/// Unit of a joint's torque: what the evidence says, else what the bounds of its regimes imply, else N m.
+pub fn torque_unit<'a>(joint: &str, evidence: &'a Evidence, regimes: &[Regime]) -> &'a str {
+    let said = evidence.torque.iter().find(|s| s.joint == joint && !s.unit.is_empty());
+    said.map_or_else(|| implied_unit(joint, regimes), |s| s.unit.as_str())
+}
+
+/// Unit of a joint's torque from the bounds of its regimes: N where it moves in metres, else N m.
+pub fn implied_unit(joint: &str, regimes: &[Regime]) -> &'static str {
+    let metres =
+        |r: &&Regime| r.joint == joint && matches!(r.bounds.unit.as_str(), "m" | "m/s" | "m/s²" | "m/s^2" | "N");
+    if regimes.iter().any(|r| metres(&r)) { "N" } else { "N m" }
+}
+
+/// Unit of positions (of velocities) over all joints: rad, m, or both where the robot has both kinds.
+pub fn motion_unit(regimes: &[Regime], velocity: bool) -> &'static str {
+    let metres = |r: &Regime| implied_unit(&r.joint, regimes) == "N";
+    let (some, all) = (regimes.iter().any(metres), regimes.iter().all(metres));
+    match (some && all, some, velocity) {
+        (true, _, false) => "m",
+        (true, _, true) => "m/s",
+        (_, true, false) => "rad, m",
+        (_, true, true) => "rad/s, m/s",
+        (_, _, false) => "rad",
+        (_, _, true) => "rad/s",
+    }
+}
+
+/// Unit of a joint's position: metres where its torque is a force.
+pub fn position_unit(joint: &str, evidence: &Evidence, regimes: &[Regime]) -> &'static str {
+    if torque_unit(joint, evidence, regimes) == "N" { "m" } else { "rad" }
+}
+
+/// Joints of an effect: names up to three, else numbers where the names are numbered, else a count.
+pub fn joints(names: &[String], all: &[String]) -> String {
+    match names {
+        [] => "whole robot".into(),
+        [one] => one.clone(),
+        several => {
+            if several.len() > 2
+                && let Some(numbers) = numbered(several, all)
+            {
+                return format!("joints {}", runs(&numbers));
+            }
+            let joined = several.join(", ");
+            if several.len() == all.len() && joined.chars().count() > 30 {
+                format!("all {} joints", all.len())
+            } else if several.len() <= 3 || joined.chars().count() <= 40 {
+                joined
+            } else {
+                format!("{} of {} joints: {}, {}, …", several.len(), all.len(), several[0], several[1])
+            }
+        }
+    }
+}
+
+/// Words joined as in a sentence: `a`, `a and b`, `a, b and c`.
+pub fn list(items: &[String], last: &str) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [rest @ .., end] => format!("{} {last} {end}", rest.join(", ")),
+    }
+}
+
+/// First letter upper case.
+pub fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
+}
+
+/// The number at the end of each name, where all joints of the robot share the text before it.
+fn numbered(names: &[String], all: &[String]) -> Option<Vec<u32>> {
+    let split = |name: &str| {
+        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+        Some((name[..stem].to_string(), name[stem..].parse::<u32>().ok()?))
+    };
+    let (stem, _) = split(all.first()?)?;
+    if !all.iter().all(|name| split(name).is_some_and(|(other, _)| other == stem)) {
+        return None;
+    }
+    names.iter().map(|name| split(name).map(|(_, number)| number)).collect()
+}
+
+/// `1–3, 5` from 1, 2, 3, 5.
+fn runs(numbers: &[u32]) -> String {
+    let mut sorted = numbers.to_vec();
+    sorted.sort_unstable();
+    sorted.dedup();
+    sorted
+        .chunk_by(|a, b| a + 1 == *b)
+        .map(|run| match run {
+            [one] => one.to_string(),
+            [a, b] => format!("{a}, {b}"),
+            [a, .., b] => format!("{a}–{b}"),
+            [] => String::new(),
+        })
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(list: &[&str]) -> Vec<String> {
+        list.iter().map(|s| (*s).to_string()).collect()
+    }
+
+    #[test]
+    fn joints_made_short() {
+        let all: Vec<String> = (1..=7).map(|i| format!("panda_joint{i}")).collect();
+        assert_eq!(joints(&all, &all), "joints 1–7");
+        assert_eq!(joints(&[all[0].clone(), all[1].clone(), all[2].clone(), all[4].clone()], &all), "joints 1–3, 5");
+        assert_eq!(joints(&all[1..2], &all), "panda_joint2");
+        let named = names(&["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_joint"]);
+        assert_eq!(joints(&named, &named), "all 4 joints");
+        assert_eq!(joints(&[], &named), "whole robot");
+    }
+
+    #[test]
+    fn bounds_in_words() {
+        let speed = |interval| Bounds { quantity: "speed".into(), unit: "rad/s".into(), interval };
+        assert_eq!(bounds(&speed([Some(0.0), Some(0.05)])), "speed 0–0.05\u{a0}rad/s");
+        assert_eq!(bounds(&speed([Some(1.2), None])), "speed >\u{a0}1.2\u{a0}rad/s");
+        assert_eq!(bounds(&speed([None, None])), "");
+    }
+}

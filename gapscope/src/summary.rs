@@ -1,0 +1,279 @@
+//! The diagnosis and the evaluation as a few lines for the terminal, at most a hundred columns wide.
+
+mod change;
+
+use crate::report::terminal::{INDENT, Paint, WIDTH, block, blocks, column, cut, cut_to, fill, pad, wrap};
+use crate::report::{
+    NONE, capital, changed, count, effect, estimate, figure, headline, implied_unit, interval, is_above_floor,
+    joint_list, largest, motion_unit, outstanding, percent, percent_figure, plain, probability_figure, regime, said_of,
+    significant, span, verdict, with_unit,
+};
+use change::{Cells, change_sign};
+use gapscope_diagnosis::schema::{Diagnosis, Estimate, Evaluation, FoundEffect, Parameter, Regime, Shrink, Verdict};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Effects, regimes, rollouts and findings shown; the rest is counted.
+const EFFECTS: usize = 5;
+const REGIMES: usize = 3;
+const FINDINGS: usize = 3;
+const LOGS: usize = 12;
+
+/// The diagnosis in at most some 25 lines: verdict, which, where, how far, notes, and where the report is.
+pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, color: bool) -> String {
+    let paint = Paint { color };
+    let data = &diagnosis.data;
+    let mut lines = vec![cut(&format!(
+        "{} · {}, {}, {} at {}",
+        diagnosis.robot,
+        count(diagnosis.joints.len(), "joint"),
+        count(data.episodes, "episode"),
+        with_unit(&plain(data.duration), "s"),
+        with_unit(&plain(data.rate), "Hz")
+    ))];
+    let label = verdict(diagnosis.verdict).to_uppercase();
+    lines.push(format!("{}  {}", paint.verdict(&label, diagnosis.verdict), headline(diagnosis)));
+    lines.push(String::new());
+    if diagnosis.verdict != Verdict::NotExcited {
+        block(&mut lines, &paint, "Which", &which(diagnosis, &paint));
+        block(&mut lines, &paint, "Where", &places(diagnosis));
+        block(
+            &mut lines,
+            &paint,
+            "How far",
+            &how_far(&diagnosis.shrink, &diagnosis.gap.regimes, !diagnosis.effects.is_empty()),
+        );
+    }
+    block(&mut lines, &paint, "Notes", &notes(diagnosis));
+    if let Some(next) = &diagnosis.next_experiment {
+        block(&mut lines, &paint, "Next", &wrap(&next.motion, 2));
+    }
+    let mut text = ordinary_spaces(&lines);
+    if let Some(out) = out {
+        text += &format!("{} {}\n", paint.head(&pad("Report", INDENT - 1)), out.display());
+    }
+    text
+}
+
+/// The evaluation in a few lines: the gap over all logs, before and after, then log by log.
+pub fn evaluation_summary(evaluation: &Evaluation) -> String {
+    let paint = Paint { color: false };
+    let mut lines = vec![];
+    if let Some(shrink) = &evaluation.shrink {
+        block(&mut lines, &paint, "How far", &how_far(shrink, &evaluation.gap.regimes, true));
+    }
+    let torque = &evaluation.gap.torque;
+    let mut joints: Vec<(&String, f64)> = torque.rms.iter().map(|(joint, &rms)| (joint, rms)).collect();
+    joints.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let width = column(joints.iter().map(|(joint, _)| joint.as_str()), 28);
+    let top = joints.first().map_or(0.0, |j| j.1);
+    let rows: Vec<String> = joints
+        .iter()
+        .take(LOGS)
+        .map(|(joint, rms)| {
+            let unit = implied_unit(joint, &evaluation.gap.regimes);
+            let floor =
+                torque.floor.get(*joint).map_or(String::new(), |f| format!("; noise floor {}", significant(*f, 2)));
+            let rms_text = with_unit(&figure(*rms), unit);
+            format!("{}  {}  torque gap {} rms{floor}", pad(joint, width), blocks(rms / top, 10), fill(&rms_text, 9))
+        })
+        .collect();
+    block(&mut lines, &paint, "Where", &rest(rows, joints.len(), LOGS, "joint"));
+    let width = column(evaluation.logs.iter().map(|log| log.log.as_str()), 44);
+    let rows: Vec<String> = evaluation
+        .logs
+        .iter()
+        .take(LOGS)
+        .map(|log| {
+            let text = match &log.shrink {
+                Some(change) => Cells::of(change, percent).line(6, 6),
+                None => {
+                    let worst = log.torque.rms.iter().max_by(|a, b| a.1.total_cmp(b.1));
+                    worst.map_or("–".into(), |(joint, rms)| format!("largest at {joint}: {} rms", figure(*rms)))
+                }
+            };
+            format!("{}  {text}", pad(&log.log, width))
+        })
+        .collect();
+    block(&mut lines, &paint, "Logs", &rest(rows, evaluation.logs.len(), LOGS, "log"));
+    ordinary_spaces(&lines)
+}
+
+/// Lines joined; no-break spaces become plain ones, so that the text can be searched and copied.
+fn ordinary_spaces(lines: &[String]) -> String {
+    let text: String = lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect();
+    text.replace(['\u{a0}', '\u{202f}'], " ")
+}
+
+fn which(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
+    if diagnosis.effects.is_empty() {
+        let text = match diagnosis.verdict {
+            Verdict::NoGap => "none needed",
+            _ => "nothing I know: no effect of the catalogue explains this gap",
+        };
+        return vec![text.into()];
+    }
+    let shown = &diagnosis.effects[..diagnosis.effects.len().min(EFFECTS)];
+    let name = |e: &FoundEffect| capital(&effect(&e.kind));
+    let place = |e: &FoundEffect| joint_list(&e.joints, &diagnosis.joints);
+    let names: Vec<String> = shown.iter().map(name).collect();
+    let places: Vec<String> = shown.iter().map(place).collect();
+    let (first, second) = (column(names.iter().map(String::as_str), 28), column(places.iter().map(String::as_str), 34));
+    let mut rows = vec![];
+    for ((found, name), place) in shown.iter().zip(&names).zip(&places) {
+        let alone = found.shrink.torque.map_or(String::new(), |s| format!(", alone {}", change_sign(s)));
+        let line = format!("{}  {:>4} % sure{alone}", pad(place, second), probability_figure(found.confidence));
+        let mut details: Vec<String> =
+            found.parameters.iter().filter_map(|(name, p)| value(&found.kind, name, p)).collect();
+        if !found.indistinguishable_from.is_empty() {
+            let kinds: Vec<String> = found.indistinguishable_from.iter().map(|kind| effect(kind)).collect();
+            details.push(format!("could also be {}", kinds.join(" or ")));
+        }
+        let details = details.join("; ");
+        let columns = INDENT + first + 4 + line.chars().count();
+        let name = paint.bold(&pad(name, first));
+        if columns + details.chars().count() <= WIDTH {
+            rows.push(format!("{name}  {line}  {details}"));
+        } else {
+            rows.push(format!("{name}  {line}"));
+            rows.extend(wrap(&details, 2).iter().map(|line| format!("  {line}")));
+        }
+    }
+    rest(rows, diagnosis.effects.len(), EFFECTS, "effect")
+}
+
+/// `static friction 0.42–1.51 N m, each ± 0.04 or less`; vectors are left to the report.
+fn value(kind: &str, name: &str, found: &Parameter) -> Option<String> {
+    let text = match found {
+        Parameter::Single(single) => one(single)?,
+        Parameter::PerJoint(map) if map.len() == 1 => one(map.values().next()?)?,
+        Parameter::PerJoint(map) => format!("{}{}", span(map.values())?, widest(map)),
+    };
+    Some(said_of(kind, name, &text))
+}
+
+fn one(single: &Estimate) -> Option<String> {
+    let printed = estimate(single);
+    let [half] = printed.half_width.as_slice() else {
+        return None;
+    };
+    let text = match half.as_str() {
+        "0" | NONE => printed.value.clone(),
+        half => format!("{} ± {half}", printed.value),
+    };
+    Some(with_unit(&text, &printed.unit))
+}
+
+/// The widest half interval over the joints.
+fn widest(map: &BTreeMap<String, Estimate>) -> String {
+    let half = |e: &Estimate| match (&e.ci95[0], &e.ci95[1]) {
+        (gapscope_diagnosis::schema::Quantity::Scalar(a), gapscope_diagnosis::schema::Quantity::Scalar(b)) => {
+            (b - a) / 2.0
+        }
+        _ => f64::NAN,
+    };
+    let widest = map.values().filter(|e| half(e).is_finite()).max_by(|a, b| half(a).total_cmp(&half(b)));
+    widest.map(estimate).map_or(String::new(), |p| match p.half_width.as_slice() {
+        [half] => format!(", ± {half} or less"),
+        _ => String::new(),
+    })
+}
+
+fn places(diagnosis: &Diagnosis) -> Vec<String> {
+    let mut rows = vec![];
+    if let Some((joint, rms)) = largest(diagnosis) {
+        let unit = implied_unit(joint, &diagnosis.gap.regimes);
+        let floor = diagnosis.gap.torque.floor.get(joint);
+        let floor =
+            floor.map_or(String::new(), |f| format!("; noise alone gives {}", with_unit(&significant(*f, 2), unit)));
+        let rms = with_unit(&figure(rms), unit);
+        rows.push(cut_to(&format!("largest at {joint}: torque gap {rms} rms{floor}"), WIDTH - INDENT));
+    }
+    if diagnosis.verdict == Verdict::NoGap {
+        return rows;
+    }
+    let mut shown: Vec<&Regime> = vec![];
+    for found in outstanding(&diagnosis.gap.regimes) {
+        let new = !shown.iter().any(|r| r.joint == found.joint);
+        if shown.len() < REGIMES && new && is_above_floor(diagnosis, &found.joint) {
+            shown.push(found);
+        }
+    }
+    let width = column(shown.iter().map(|r| r.joint.as_str()), 22);
+    // A band of frequencies says nothing without its bounds.
+    let name = |r: &&Regime| if r.regime == "frequency_band" { interval(&r.bounds) } else { regime(&r.regime) };
+    let names: Vec<String> = shown.iter().map(name).collect();
+    let name_width = column(names.iter().map(String::as_str), 17);
+    for (found, name) in shown.iter().zip(&names) {
+        rows.push(format!(
+            "{}  {}  {} {:>4} % of squared gap, {} of {}",
+            pad(&found.joint, width),
+            pad(name, name_width),
+            blocks(found.share, 8),
+            percent_figure(found.share),
+            percent(found.samples),
+            if found.regime == "frequency_band" { "effort" } else { "samples" }
+        ));
+    }
+    if shown.is_empty() && !diagnosis.gap.regimes.is_empty() {
+        rows.push("spread over all regimes of the motion".into());
+    }
+    rows
+}
+
+fn how_far(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Vec<String> {
+    let mut cells = vec![];
+    if changed(&shrink.torque) {
+        let floor = percent(shrink.reference.noise_floor);
+        let note = format!("   of effort std, floor {floor}");
+        cells.push(("torque".to_string(), Cells::of(&shrink.torque, percent), note));
+    }
+    if changed(&shrink.one_step) {
+        cells.push((
+            "one step".into(),
+            Cells::of(&shrink.one_step, figure),
+            format!("   {} rms", motion_unit(regimes, true)),
+        ));
+    }
+    let n = shrink.rollout.len();
+    let shown: Vec<usize> = if n <= 3 { (0..n).collect() } else { vec![0, n / 2, n - 1] };
+    for h in shown.into_iter().filter_map(|i| shrink.rollout.get(i)).filter(|h| changed(&h.change)) {
+        cells.push((
+            format!("rollout {} s", plain(h.horizon)),
+            Cells::of(&h.change, figure),
+            format!("   {} rms", motion_unit(regimes, false)),
+        ));
+    }
+    let name = column(cells.iter().map(|c| c.0.as_str()), 16);
+    let before = column(cells.iter().map(|c| c.1.before.as_str()), 14);
+    let after = column(cells.iter().map(|c| c.1.after.as_str()), 14);
+    let row = |(head, c, note): &(String, Cells, String)| {
+        let text = if corrected { c.line(before, after) } else { fill(&c.before, before) };
+        format!("{}  {text}{note}", pad(head, name))
+    };
+    cells.iter().map(row).collect()
+}
+
+fn notes(diagnosis: &Diagnosis) -> Vec<String> {
+    let findings = &diagnosis.data.findings;
+    let mut rows = vec![];
+    let best = diagnosis.alternatives.iter().max_by(|a, b| a.probability.total_cmp(&b.probability));
+    if let Some(other) = best.filter(|a| a.probability >= 0.05) {
+        let kinds: Vec<String> = other.effects.iter().map(|kind| effect(kind)).collect();
+        let kinds = if kinds.is_empty() { "no effect at all".into() } else { kinds.join(" + ") };
+        rows.push(cut_to(&format!("or {kinds} ({})", percent(other.probability)), WIDTH - INDENT));
+    }
+    rows.extend(findings.iter().take(FINDINGS).map(|text| cut_to(text, WIDTH - INDENT)));
+    rest(rows, findings.len(), FINDINGS, "finding")
+}
+
+/// Appends a count of what is not shown.
+fn rest(mut rows: Vec<String>, all: usize, shown: usize, thing: &str) -> Vec<String> {
+    if all > shown {
+        rows.push(format!("and {}", count(all - shown, &format!("more {thing}"))));
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,66 @@
+//! The terminal text: its size, its words, and nothing that steers the terminal.
+
+use super::*;
+use crate::report::sample;
+
+#[test]
+fn fits_the_terminal() {
+    for (name, diagnosis, _) in sample::all() {
+        let text = summary(&diagnosis, Some(Path::new("/tmp/log.gapscope/report.html")), false);
+        assert!(text.lines().count() <= 26, "{name}: {} lines\n{text}", text.lines().count());
+        for line in text.lines() {
+            assert!(line.chars().count() <= WIDTH, "{name}: {} columns: {line}", line.chars().count());
+        }
+        assert!(!text.contains("NaN") && !text.contains("inf ") && !text.contains('\u{1b}'), "{name}\n{text}");
+        assert!(text.contains(&verdict(diagnosis.verdict).to_uppercase()) && text.contains("report.html"));
+    }
+}
+
+#[test]
+fn fits_with_long_names_and_odd_changes() {
+    let (_, diagnosis, _) = sample::explained();
+    let text = serde_json::to_string(&diagnosis).unwrap_or_default();
+    let long = text.replace("panda_joint", "left_arm_shoulder_or_wrist_roll_joint_");
+    let Ok(mut diagnosis) = serde_json::from_str::<Diagnosis>(&long) else { unreachable!("renaming keeps the schema") };
+    diagnosis.shrink.torque.shrink = Some(-1.69);
+    diagnosis.shrink.torque.ci95 = Some([-3.15, -0.8]);
+    diagnosis.shrink.one_step.ci95 = Some([-0.28, 0.06]);
+    diagnosis.shrink.rollout[0].change.shrink = Some(0.99998);
+    diagnosis.shrink.rollout[0].change.ci95 = Some([0.99997, 0.99999]);
+    for regime in &mut diagnosis.gap.regimes {
+        regime.regime = regime.regime.replace("reversal", "high_acceleration");
+    }
+    let text = summary(&diagnosis, None, false);
+    for line in text.lines() {
+        assert!(line.chars().count() <= WIDTH, "{} columns: {line}", line.chars().count());
+    }
+    for part in ["+169 % (80–315 %)", "(−6 % to +28 %)", "−99.9 %  ", "left_arm_shoulder_or_wrist_roll_joint_"] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+}
+
+#[test]
+fn names_what_it_found() {
+    let (_, diagnosis, _) = sample::explained();
+    let text = summary(&diagnosis, None, false);
+    for part in ["Coulomb friction", "joints 1–7", "Payload", "1.21 ± 0.060", "rollout"] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+    assert!(summary(&diagnosis, None, true).contains("\u{1b}[1;32mEXPLAINED"));
+}
+
+#[test]
+fn control_characters_stay_out() {
+    let (_, mut diagnosis, _) = sample::explained();
+    diagnosis.robot = "arm\u{1b}[31m\n".into();
+    diagnosis.data.findings = vec!["a\u{1b}]0;title\u{7}".into()];
+    assert!(!summary(&diagnosis, None, false).contains('\u{1b}'));
+}
+
+#[test]
+fn evaluation_in_lines() {
+    let text = evaluation_summary(&sample::evaluation(true));
+    assert!(text.contains("→") && text.contains("run_07.csv"), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+    assert!(!evaluation_summary(&sample::evaluation(false)).contains('→'));
+}

@@ -5,6 +5,7 @@ mod cli;
 mod demo;
 mod diagnose;
 mod evaluate;
+mod generate;
 mod input;
 mod output;
 mod report;
@@ -20,6 +21,7 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Demo(args) => demo::run(&args),
+        Command::Generate(args) => generate::run(&args),
     };
     match result {
         Ok(text) => {

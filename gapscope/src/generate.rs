@@ -1,0 +1,249 @@
+//! `gapscope generate`: logs of a simulated robot with known effects, with its URDF and the truth beside them.
+
+use crate::cli::Generate;
+use crate::output;
+use anyhow::{Context, Result, bail};
+use gapscope_datasets::{Episode, Perturbation, Recipe, Sensors, generate, write_csv};
+use gapscope_dynamics::{Model, robots};
+use gapscope_effects::Effect;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// The public name of the schema of truth.json.
+const TRUTH_SCHEMA: &str = "gapscope.truth/1";
+
+/// What the logs were made of. `effects` has the public names, and `--effects` reads it back.
+#[derive(Debug, Serialize)]
+struct Truth<'a> {
+    schema: &'static str,
+    robot: &'a str,
+    seed: u64,
+    episodes: u64,
+    recipe: Recipe,
+    perturbation: Option<Perturbation>,
+    effects: &'a [Effect],
+}
+
+/// Simulates and writes the logs; returns what to print.
+///
+/// # Errors
+/// A robot or effects that cannot be read or do not go together, a number that cannot be, files that exist.
+pub fn run(args: &Generate) -> Result<String> {
+    let (urdf, model) = robot(args)?;
+    let mut effects = match &args.effects {
+        Some(file) => read_effects(file)?,
+        None => Vec::new(),
+    };
+    if let Some(scale) = args.perturb.filter(|scale| !(0.0..=10.0).contains(scale)) {
+        bail!("--perturb is {scale}, but must be between 0 and 10");
+    }
+    let perturbation = args.perturb.map(Perturbation::scaled);
+    if let Some(perturbation) = perturbation {
+        effects.extend(perturbation.draw(&model, args.seed));
+    }
+    let recipe = recipe(args);
+    let out = match &args.out {
+        Some(out) => out.clone(),
+        None => output::new_folder(Path::new(""), "gapscope-logs")?,
+    };
+    let logs: Vec<PathBuf> = (0..args.episodes).map(|i| out.join(format!("episode_{i}.csv"))).collect();
+    let (urdf_file, truth_file) = (out.join("robot.urdf"), out.join("truth.json"));
+    let files = logs.iter().chain([&urdf_file, &truth_file]);
+    if let (Some(there), false) = (files.into_iter().find(|file| file.symlink_metadata().is_ok()), args.force) {
+        bail!(
+            "{} exists already; choose another folder with --out, or allow it to be replaced with --force",
+            there.display()
+        );
+    }
+
+    let bar = bar(args.episodes);
+    logs.par_iter().enumerate().try_for_each(|(i, file)| -> Result<()> {
+        let log = episode(&model, &effects, args.seed, i as u64, &recipe)?;
+        // Not before: what cannot be simulated leaves no folder behind.
+        std::fs::create_dir_all(&out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+        write_csv(file, &log, args.force)?;
+        bar.inc(1);
+        Ok(())
+    })?;
+    output::write(&urdf_file, &urdf)?;
+    bar.finish_and_clear();
+    let (robot, seed, episodes) = (model.name(), args.seed, args.episodes);
+    let truth = Truth { schema: TRUTH_SCHEMA, robot, seed, episodes, recipe, perturbation, effects: &effects };
+    output::write(&truth_file, &(serde_json::to_string_pretty(&truth)? + "\n"))?;
+    Ok(told(&model, &effects, args, &out))
+}
+
+/// The robot's URDF and model: a file's, or a built-in one's where there is no file of the name.
+fn robot(args: &Generate) -> Result<(String, Model)> {
+    let name = args.robot.display().to_string();
+    let built_in = robots::NAMES.iter().find(|built_in| **built_in == name && !args.robot.exists());
+    let xml = match built_in.and_then(|name| robots::urdf(name)) {
+        Some(xml) => xml.to_owned(),
+        None => std::fs::read_to_string(&args.robot).with_context(|| {
+            format!("cannot read the robot description {name}; built in are {}", robots::NAMES.join(", "))
+        })?,
+    };
+    let locked: Vec<&str> = args.lock.iter().map(String::as_str).collect();
+    let loaded = Model::from_urdf_locking(&xml, &locked).with_context(|| format!("{name} cannot be used"))?;
+    if loaded.model.dof() == 0 {
+        bail!("{name} has no joint that moves");
+    }
+    Ok((xml, loaded.model))
+}
+
+/// A list of effects, or the `effects` of any JSON object.
+fn read_effects(file: &Path) -> Result<Vec<Effect>> {
+    let name = file.display();
+    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read the effects {name}"))?;
+    let mut value: serde_json::Value = serde_json::from_str(&text).with_context(|| format!("{name} is not JSON"))?;
+    let list = value.get_mut("effects").map(serde_json::Value::take).unwrap_or(value);
+    serde_json::from_value(list).with_context(|| {
+        format!(r#"{name} is not a list of effects like [{{"kind": "torque_bias", "bias": {{"joint1": 0.5}}}}]"#)
+    })
+}
+
+fn recipe(args: &Generate) -> Recipe {
+    Recipe {
+        seconds: args.seconds,
+        rate: args.rate,
+        motion: args.motion.into(),
+        speed: args.speed,
+        servo: args.servo.into(),
+        motor_encoders: args.motor_encoders,
+        sensors: Sensors {
+            position_noise: args.position_noise,
+            encoder_step: args.encoder_step,
+            velocity_cutoff: args.velocity_cutoff,
+            effort_noise: args.effort_noise,
+            effort_ripple: args.effort_ripple,
+            clock_jitter: args.clock_jitter,
+            dropped: args.dropped,
+        },
+    }
+}
+
+fn episode(model: &Model, effects: &[Effect], seed: u64, index: u64, recipe: &Recipe) -> Result<Episode> {
+    // Seeds of neighbouring data sets must not share episodes.
+    let seed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index);
+    generate(model, effects, seed, recipe, &format!("episode_{index}.csv")).context("the logs cannot be simulated")
+}
+
+fn bar(episodes: u64) -> ProgressBar {
+    let bar = ProgressBar::new(episodes);
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} logs  {eta} left") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn told(model: &Model, effects: &[Effect], args: &Generate, out: &Path) -> String {
+    let out = out.display();
+    let kinds: std::collections::BTreeSet<String> = effects.iter().map(|e| e.kind().to_string()).collect();
+    let lacks =
+        if kinds.is_empty() { "no effect that its URDF lacks".to_owned() } else { Vec::from_iter(kinds).join(", ") };
+    let lock: String = args.lock.iter().map(|joint| format!(" --lock {joint}")).collect();
+    format!(
+        "{}, {} joints, with {lacks}.\n{} logs of {} s at {} Hz with their robot.urdf are in {out}; truth.json says what is in them.\n\
+         gapscope diagnose {out}/robot.urdf {out}/episode_*.csv{lock}",
+        model.name(),
+        model.dof(),
+        args.episodes,
+        args.seconds,
+        args.rate,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::{Cli, Command};
+    use clap::Parser;
+
+    fn generated(line: &str, out: &Path) -> Result<String> {
+        let words = ["gapscope", "generate"].into_iter().chain(line.split_whitespace());
+        let words = words.map(str::to_owned).chain(["--out".to_owned(), out.display().to_string()]);
+        match Cli::try_parse_from(words).unwrap().command {
+            Command::Generate(args) => run(&args),
+            _ => unreachable!(),
+        }
+    }
+
+    fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
+        let mut files: Vec<_> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap())
+            .map(|entry| (entry.file_name().into_string().unwrap(), std::fs::read(entry.path()).unwrap()))
+            .collect();
+        files.sort();
+        files
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bytes_and_the_truth_makes_the_same_robot() {
+        let dir = tempfile::tempdir().unwrap();
+        let [a, b, c, d] = ["a", "b", "c", "d"].map(|name| dir.path().join(name));
+        let line =
+            "double_pendulum --perturb --episodes 3 --seconds 1 --motion point-to-point --servo pd --dropped 0.1";
+        generated(line, &a).unwrap();
+        generated(line, &b).unwrap();
+        let names: Vec<String> = bytes(&a).into_iter().map(|(name, _)| name).collect();
+        assert_eq!(names, ["episode_0.csv", "episode_1.csv", "episode_2.csv", "robot.urdf", "truth.json"]);
+        assert_eq!(bytes(&a), bytes(&b));
+        generated(&format!("{line} --seed 1"), &c).unwrap();
+        assert_ne!(bytes(&a)[0], bytes(&c)[0]);
+        let again = line.replace("--perturb", &format!("--effects {}", a.join("truth.json").display()));
+        generated(&again, &d).unwrap();
+        assert_eq!(bytes(&a)[..4], bytes(&d)[..4]);
+    }
+
+    #[test]
+    fn what_it_writes_is_read_without_findings() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("logs");
+        generated("arm6 --episodes 2 --seconds 3 --rate 200 --encoder-step 1e-5 --clock-jitter 1e-5", &out).unwrap();
+        let input = crate::cli::Input {
+            robot: out.join("robot.urdf"),
+            logs: vec![out.join("episode_0.csv"), out.join("episode_1.csv")],
+            map: vec![],
+            map_file: None,
+            lock: vec![],
+            allow_truncated: false,
+            skip_bad_logs: false,
+        };
+        let loaded = crate::input::load(&input).unwrap();
+        assert_eq!((loaded.episodes.len(), loaded.episodes[0].len()), (2, 600));
+        assert_eq!(loaded.findings, Vec::<String>::new());
+    }
+
+    #[test]
+    fn what_cannot_be_is_an_error_and_leaves_nothing_behind() {
+        let dir = tempfile::tempdir().unwrap();
+        let (out, effects) = (dir.path().join("logs"), dir.path().join("effects.json"));
+        let fails = |line: &str, text: &str| {
+            let error = format!("{:#}", generated(line, &out).unwrap_err());
+            assert!(error.contains(text), "{line}: {error}");
+            assert!(!out.exists(), "{line}");
+        };
+        fails("nowhere.urdf", "arm7, arm6, double_pendulum");
+        fails("arm7 --perturb nan", "between 0 and 10");
+        fails("arm7 --rate 0", "rate is 0");
+        fails("arm7 --speed=-1", "speed is -1");
+        fails("arm7 --dropped 2", "dropped is 2");
+        let with = format!("arm7 --effects {}", effects.display());
+        fails(&with, "cannot read the effects");
+        std::fs::write(&effects, r#"[{"kind": "torque_bias", "bias": {"elbow": 1}}]"#).unwrap();
+        fails(&with, "`elbow`");
+        std::fs::write(&effects, r#"[{"kind": "tork_bias"}]"#).unwrap();
+        fails(&with, "tork_bias");
+
+        generated("double_pendulum --episodes 1 --seconds 0.1", &out).unwrap();
+        let before = bytes(&out);
+        let error = generated("double_pendulum --episodes 1 --seconds 0.2", &out).unwrap_err();
+        assert!(error.to_string().contains("--force"), "{error}");
+        assert_eq!(bytes(&out), before);
+        generated("double_pendulum --episodes 1 --seconds 0.2 --force", &out).unwrap();
+        assert_ne!(bytes(&out), before);
+    }
+}

@@ -51,6 +51,21 @@ impl Default for Recipe {
     }
 }
 
+/// A plant that a servo can drive.
+pub trait Robot: StepModel {
+    /// Positions that the drives' own encoders show in a state x, rad or m, written to `q` (n). A servo closes its loop over
+    /// them; the log shows the first n numbers of x.
+    fn drive_positions(&self, x: &[f64], q: &mut [f64]) {
+        q.copy_from_slice(&x[..q.len()]);
+    }
+}
+
+impl Robot for Plant {
+    fn drive_positions(&self, x: &[f64], q: &mut [f64]) {
+        Plant::drive_positions(self, x, q);
+    }
+}
+
 /// Why there is no log.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GenerateError {
@@ -129,7 +144,7 @@ pub fn generate(
 pub fn record(
     model: &Model,
     effects: &[Effect],
-    plant: &mut dyn StepModel,
+    plant: &mut dyn Robot,
     seed: u64,
     recipe: &Recipe,
     name: &str,
@@ -144,28 +159,33 @@ pub fn record(
     let empty = || vec![Vec::with_capacity(samples); n];
     let (mut position, mut logged, mut command) = (empty(), empty(), empty());
     let [mut target, mut target_v, mut target_a] = std::array::from_fn(|_| vec![0.0; n]);
-    let [mut measured, mut before, mut velocity, mut effort] = std::array::from_fn(|_| vec![0.0; n]);
+    let [mut measured, mut seen, mut before, mut velocity, mut effort] = std::array::from_fn(|_| vec![0.0; n]);
     reference.at_into(0.0, &mut target, &mut target_v, &mut target_a);
     let mut x = vec![0.0; plant.state_len()];
     plant.start(&target, &target_v, &mut x);
     for k in 0..samples {
         let time = k as f64 * dt;
         reference.at_into(time, &mut target, &mut target_v, &mut target_a);
+        plant.drive_positions(&x, &mut seen);
         for j in 0..n {
-            measured[j] = recipe.sensors.position(x[j], &mut random);
-            // The servo differentiates its encoder, as drives do; at the first sample it trusts the reference.
-            velocity[j] = if k > 0 { (measured[j] - before[j]) / dt } else { target_v[j] };
-            if !((x[j] - target[j]).abs() < LOST) {
+            let away = (x[j] - target[j]).abs();
+            if away.is_nan() || away > LOST {
                 return Err(GenerateError::RunsAway { joint: model.joints()[j].name.clone(), time });
             }
+            measured[j] = recipe.sensors.position(x[j], &mut random);
+            // One encoder, one error: what the drive sees beside it is the wind-up of its spring.
+            seen[j] += measured[j] - x[j];
+            // The servo differentiates its encoder, as drives do; until it has two readings it trusts the reference.
+            // The first one does not count: springs wind up in the first step.
+            velocity[j] = if k > 1 { (seen[j] - before[j]) / dt } else { target_v[j] };
         }
-        servo.effort([&target, &target_v, &target_a], &measured, &velocity, &mut effort);
+        servo.effort([&target, &target_v, &target_a], &seen, &velocity, &mut effort);
         for j in 0..n {
             position[j].push(measured[j]);
             logged[j].push(effort[j]);
             command[j].push(target[j]);
         }
-        std::mem::swap(&mut measured, &mut before);
+        std::mem::swap(&mut seen, &mut before);
         for _ in 0..SUBSTEPS {
             plant.step(&mut x, &effort);
         }

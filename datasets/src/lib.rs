@@ -31,7 +31,7 @@ pub use check::check_logs;
 pub use column_map::{ColumnMap, Source};
 pub use episode::{Channel, Episode, Samples};
 pub use error::{LogError, LogErrorKind};
-pub use generate::{GenerateError, Recipe, generate, record};
+pub use generate::{GenerateError, Recipe, Robot, generate, record};
 pub use perturb::Perturbation;
 pub use read::{ReadOptions, read_logs};
 pub use reference::{Excitation, Reference, ReferenceError, ReferenceKind, excitation};

@@ -4,9 +4,9 @@
 mod common;
 
 use common::{all, built_in, drives, slider};
-use gapscope_datasets::{GenerateError, Perturbation, Recipe, ReferenceKind, Sensors, Servo, generate};
+use gapscope_datasets::{Episode, GenerateError, Perturbation, Recipe, ReferenceKind, Sensors, Servo, generate};
 use gapscope_dynamics::StepModel;
-use gapscope_effects::{ActuationDelay, Effect, Plant, TorqueBias};
+use gapscope_effects::{ActuationDelay, Armature, Effect, JointElasticity, Plant, TorqueBias};
 
 fn rms(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0), |(sum, count), x| (sum + x * x, count + 1));
@@ -14,7 +14,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// The greatest distance of any joint from its reference.
-fn worst_error(log: &gapscope_datasets::Episode) -> f64 {
+fn worst_error(log: &Episode) -> f64 {
     let command = log.command.as_ref().unwrap();
     let error = |j: usize| log.position[j].iter().zip(&command[j]).map(|(q, c)| (q - c).abs()).fold(0.0, f64::max);
     (0..log.joint_count()).map(error).fold(0.0, f64::max)
@@ -29,7 +29,6 @@ fn both_servos_track_with_the_friction_and_rotors_of_real_drives() {
                 let recipe = Recipe { seconds: 4.0, rate, servo, ..Recipe::default() };
                 let log = generate(&model, &drives(&model), 5, &recipe, "a.csv").unwrap();
                 let worst = worst_error(&log);
-                println!("{} {servo:?} at {rate} Hz: {worst:.4}", model.name());
                 assert!(worst < most, "{} {servo:?} at {rate} Hz: {worst}", model.name());
             }
         }
@@ -46,6 +45,35 @@ fn every_motion_is_tracked_and_late_effort_does_not_shake_the_robot() {
         let worst = worst_error(&generate(&model, &effects, 1, &recipe, "a.csv").unwrap());
         assert!(worst < 0.08, "{motion:?}: {worst}");
     }
+}
+
+/// A link on a spring, its resonance below the servo's bandwidth with the motor held: over the link's own position no servo
+/// of this bandwidth is stable.
+#[test]
+fn a_servo_closes_its_loop_over_the_motor_whatever_the_log_shows() {
+    let model = slider();
+    let on = |value: f64| [("rail".to_owned(), value)].into();
+    let stiffness: f64 = 2.0 * (2.0 * std::f64::consts::PI * 5.0_f64).powi(2);
+    let effects = [
+        Effect::Armature(Armature { armature: on(1.5) }),
+        Effect::JointElasticity(JointElasticity {
+            stiffness: on(stiffness),
+            damping: on(0.1 * (2.0 * stiffness).sqrt()),
+        }),
+    ];
+    let [link, motor] = [false, true].map(|motor_encoders| {
+        let recipe = Recipe { motor_encoders, sensors: Sensors::IDEAL, ..Recipe::default() };
+        generate(&model, &effects, 4, &recipe, "a.csv").unwrap()
+    });
+    // The spring carries the weight of 2 kg: the link hangs lower than its motor.
+    let sag = 2.0 * 9.81 / stiffness;
+    let mean = |log: &Episode| {
+        let command = &log.command.as_ref().unwrap()[0];
+        log.position[0].iter().zip(command).skip(1000).map(|(q, c)| q - c).sum::<f64>() / 4000.0
+    };
+    assert!(mean(&motor).abs() < 0.1 * sag, "{}", mean(&motor));
+    assert!((mean(&link) + sag).abs() < 0.1 * sag, "{} {sag}", mean(&link));
+    assert!(worst_error(&motor) < 0.02 && worst_error(&link) < 0.05, "{} {}", worst_error(&motor), worst_error(&link));
 }
 
 #[test]
@@ -72,7 +100,6 @@ fn four_steps_a_sample_are_enough() {
             .into();
         worst = ends[0].iter().zip(&ends[1]).map(|(a, b)| (a - b).abs()).fold(worst, f64::max);
     }
-    println!("largest difference after 0.1 s: {worst:e} rad");
     assert!(worst < 5e-6, "{worst:e}");
 }
 

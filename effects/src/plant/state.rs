@@ -72,4 +72,22 @@ impl Plant {
             *clock = time;
         }
     }
+
+    /// Positions that the drives' own encoders show in a state, rad or m, written to `q` (n): on joints with a spring or
+    /// play and a rotor those of the motors, on all others those of the links. A servo closes its loop over them, whatever the
+    /// log shows. Before the first step motors count as turned with their links. Allocates nothing.
+    ///
+    /// # Panics
+    /// If a slice has another length.
+    pub fn drive_positions(&self, x: &[f64], q: &mut [f64]) {
+        q.copy_from_slice(&x[..q.len()]);
+        let wind_up = &x[x.len() - 2 * self.drives.len()..];
+        for (drive, wind_up) in self.drives.iter().zip(wind_up.chunks_exact(2)) {
+            match (drive.motor.is_some(), self.motor_encoders) {
+                (true, false) => q[drive.joint] += wind_up[0],
+                (false, true) => q[drive.joint] -= wind_up[0],
+                _ => {}
+            }
+        }
+    }
 }

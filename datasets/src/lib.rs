@@ -21,6 +21,7 @@ mod resample;
 mod robust;
 mod rows;
 mod time_stamps;
+mod transitions;
 mod write;
 
 pub use check::check_logs;
@@ -31,4 +32,5 @@ pub use generate::{Recipe, generate};
 pub use motion::Fourier;
 pub use read::{ReadOptions, read_logs};
 pub use resample::{Uniform, derive_velocity, resample};
+pub use transitions::transitions;
 pub use write::write_csv;

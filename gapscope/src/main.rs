@@ -7,8 +7,11 @@ mod diagnose;
 mod evaluate;
 mod input;
 mod output;
+mod picture;
 mod report;
+mod study;
 mod summary;
+mod train;
 
 use clap::Parser;
 use cli::{Cli, Command};
@@ -20,6 +23,8 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Demo(args) => demo::run(&args),
+        Command::Train(args) => train::run(&args),
+        Command::Study(args) => study::run(&args),
     };
     match result {
         Ok(text) => {

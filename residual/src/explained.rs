@@ -15,7 +15,7 @@ use rand_pcg::Pcg64;
 /// Settings of [`explained_share`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Alarm {
-    /// Random features, beside the inputs themselves and a constant.
+    /// Random features, beside the inputs themselves, their squares and a constant.
     pub neurons: usize,
     /// Draws them.
     pub seed: u64,
@@ -23,7 +23,7 @@ pub struct Alarm {
 
 impl Default for Alarm {
     fn default() -> Self {
-        Self { neurons: 256, seed: 0 }
+        Self { neurons: 512, seed: 0 }
     }
 }
 
@@ -40,7 +40,7 @@ pub struct Explained {
 }
 
 /// Ridge strengths tried, relative to features of variance one.
-const STRENGTHS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+const STRENGTHS: [f64; 5] = [1e-5, 1e-3, 1e-1, 3.0, 300.0];
 
 /// How much of `targets`, `[rows][n]` (residual torques, say), a smooth function of `features`, `[rows][d]` (q, q̇, q̈ or
 /// their sines and cosines; any units), explains on rows it was not fitted to.
@@ -103,8 +103,7 @@ pub fn explained_share(
             Some(phi) => subtract(&own, phi, &projection(&own, phi, k)),
             None => own,
         };
-        let moments: Vec<Mat<f64>> =
-            (0..parts.len()).map(|m| cross(&blocks[m], &rest[m], parts[m].len())).collect();
+        let moments: Vec<Mat<f64>> = (0..parts.len()).map(|m| cross(&blocks[m], &rest[m], parts[m].len())).collect();
         let Some(weights) = fit(k, &parts, &grams, &moments, &rest) else { continue };
         let outputs: Vec<Vec<f64>> = blocks.iter().map(|f| apply(f, &weights)).collect();
         let outputs = match &phi {
@@ -136,40 +135,55 @@ fn columns(what: &'static str, values: &[f64], rows: usize) -> Result<usize, Res
     Ok(width)
 }
 
-/// `[rows][1 + width + neurons]`: a constant, the normalised inputs, and tanh(a · x + b). Half of the neurons look at one
-/// input alone, as friction and springs do, a quarter at two, a quarter at all.
+/// `[rows][1 + 2 width + neurons]`: a constant, the normalised inputs and their squares, and tanh(a · x + b). Half of the
+/// neurons look at one input alone, as friction and springs do, a quarter at two, a quarter at all.
 fn random_features(features: &[f64], width: usize, alarm: &Alarm) -> Vec<f64> {
-    let normal: Vec<f64> = Normal::of(features, width).apply(features);
+    let normal = Normal::of(features, width);
+    let rows: Vec<f64> = normal.apply(features);
     let mut random = Pcg64::seed_from_u64(alarm.seed);
     let neurons: Vec<(Vec<(usize, f64)>, f64)> = (0..alarm.neurons)
         .map(|i| {
+            let mut draw = || random.sample::<f64, _>(StandardNormal);
+            if i % 2 == 0 {
+                // In turn, so that every input has its share: steps of friction at zero, the others anywhere.
+                let (j, kind) = ((i / 2) % width, (i / (2 * width)) % 6);
+                let slope = [40.0, 10.0, 3.0, 1.0, 1.0, 0.5][kind];
+                let centre = if kind < 2 { -normal.mean[j] / normal.scale[j] } else { draw() };
+                return (vec![(j, slope)], -slope * centre);
+            }
+            let offset = draw();
             let inputs: Vec<usize> = match i % 4 {
-                // In turn, so that every input has its share.
-                0 | 2 => vec![(i / 2) % width],
-                1 => vec![random.random_range(0..width), random.random_range(0..width)],
+                1 => (0..2).map(|_| random.random_range(0..width)).collect(),
                 _ => (0..width).collect(),
             };
-            // Steep enough, for one input, to draw a step of friction.
-            let steep = if inputs.len() == 1 { [1.0, 4.0, 20.0][(i / (2 * width)) % 3] } else { 1.5 };
-            let size = steep / (inputs.len() as f64).sqrt();
-            let slopes = inputs.iter().map(|&j| (j, size * random.sample::<f64, _>(StandardNormal))).collect();
-            (slopes, 0.5 * steep * random.sample::<f64, _>(StandardNormal))
+            let size = 1.5 / (inputs.len() as f64).sqrt();
+            let slopes = inputs.into_iter().map(|j| (j, size * random.sample::<f64, _>(StandardNormal)));
+            (slopes.collect(), offset)
         })
         .collect();
-    let mut out = Vec::with_capacity(normal.len() / width * (1 + width + alarm.neurons));
-    for row in normal.chunks_exact(width) {
+    let mut out = Vec::with_capacity(rows.len() / width * (1 + 2 * width + alarm.neurons));
+    for row in rows.chunks_exact(width) {
         out.push(1.0);
         out.extend_from_slice(row);
-        out.extend(neurons.iter().map(|(slopes, b)| slopes.iter().map(|&(j, a)| a * row[j]).sum::<f64>() + b).map(f64::tanh));
+        out.extend(row.iter().map(|x| x * x));
+        let sum = |(slopes, b): &(Vec<(usize, f64)>, f64)| slopes.iter().map(|&(j, a)| a * row[j]).sum::<f64>() + b;
+        out.extend(neurons.iter().map(|neuron| sum(neuron).tanh()));
     }
     out
 }
 
 /// Weights from all folds but `k`, with the strength that predicts the other folds best, one at a time, `k` aside.
-fn fit(k: usize, parts: &[Vec<usize>], grams: &[Mat<f64>], moments: &[Mat<f64>], rest: &[Vec<f64>]) -> Option<Mat<f64>> {
+fn fit(
+    k: usize,
+    parts: &[Vec<usize>],
+    grams: &[Mat<f64>],
+    moments: &[Mat<f64>],
+    rest: &[Vec<f64>],
+) -> Option<Mat<f64>> {
     let without = |left_out: &[usize]| {
         let used = || (0..parts.len()).filter(|m| !left_out.contains(m));
-        let sum = |mats: &[Mat<f64>]| used().fold(Mat::zeros(mats[0].nrows(), mats[0].ncols()), |sum, m| sum + &mats[m]);
+        let sum =
+            |mats: &[Mat<f64>]| used().fold(Mat::zeros(mats[0].nrows(), mats[0].ncols()), |sum, m| sum + &mats[m]);
         let rows: usize = used().map(|m| parts[m].len()).sum();
         (sum(grams), sum(moments), rows)
     };
@@ -177,7 +191,7 @@ fn fit(k: usize, parts: &[Vec<usize>], grams: &[Mat<f64>], moments: &[Mat<f64>],
     let mut best = (f64::INFINITY, STRENGTHS[STRENGTHS.len() - 1]);
     if inner.len() > 1 {
         // A few of the folds tell the strength; all of them would take their square of time.
-        let judges: Vec<_> = inner.iter().take(4).map(|&m| (m, without(&[k, m]))).collect();
+        let judges: Vec<_> = inner.iter().take(2).map(|&m| (m, without(&[k, m]))).collect();
         for strength in STRENGTHS {
             let error: f64 = judges
                 .iter()

@@ -25,6 +25,7 @@ mod scale;
 mod sensors;
 mod servo;
 mod time_stamps;
+mod transitions;
 mod write;
 
 pub use check::check_logs;
@@ -38,4 +39,5 @@ pub use reference::{Excitation, Reference, ReferenceError, ReferenceKind, excita
 pub use resample::{Uniform, derive_velocity, resample};
 pub use sensors::Sensors;
 pub use servo::Servo;
+pub use transitions::transitions;
 pub use write::write_csv;

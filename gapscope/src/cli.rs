@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gapscope_datasets::{ReferenceKind, Servo};
+use gapscope_residual::On;
 use std::path::PathBuf;
 
 /// Where a robot's simulator drifts from the robot, which effect causes it, and how far it shrinks.
@@ -24,6 +25,10 @@ pub enum Command {
     Demo(Demo),
     /// Simulate logs of a robot with effects that its URDF lacks
     Generate(Generate),
+    /// Train a network on logs: a residual on top of the robot's model, or a pure one without it
+    Train(Train),
+    /// Measure what residual and pure learning need and where they fail, on a simulated arm
+    Study(Study),
 }
 
 /// Which robot and logs.
@@ -207,4 +212,110 @@ impl From<Drive> for Servo {
             Drive::Pd => Servo::Pd,
         }
     }
+/// What is trained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// f_hyb = f_phys + r
+    Residual,
+    /// x⁺ = x + f(x, τ)
+    Pure,
+}
+
+impl Kind {
+    /// Name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        if self == Kind::Residual { "residual" } else { "pure" }
+    }
+}
+
+/// Arguments of `train`.
+#[derive(Debug, Args)]
+pub struct Train {
+    /// What to train
+    #[arg(value_enum)]
+    pub kind: Kind,
+    /// Robot and logs
+    #[command(flatten)]
+    pub input: Input,
+    /// Folder for weights, learning curve and record [default: a new folder beside the first log]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    pub force: bool,
+    /// What a residual corrects: next-state, acceleration or torque [default: next-state]
+    #[arg(long, value_parser = on, value_name = "WHAT")]
+    pub on: Option<On>,
+    /// Reference configuration: two-hidden-128 or one-hidden-64
+    #[arg(long, default_value = "two-hidden-128", value_name = "NAME")]
+    pub reference: String,
+    /// Sizes of the hidden layers, e.g. 128,128, instead of the reference's
+    #[arg(long, value_delimiter = ',', value_name = "SIZES")]
+    pub hidden: Vec<usize>,
+    /// Passes over the data
+    #[arg(long, default_value_t = 100)]
+    pub epochs: usize,
+    /// Steps an update sees [default: the reference's 64]
+    #[arg(long)]
+    pub batch: Option<usize>,
+    /// Adam's learning rate [default: the reference's 0.001]
+    #[arg(long)]
+    pub rate: Option<f64>,
+    /// Let the learning rate fall to zero along half a cosine
+    #[arg(long)]
+    pub cosine: bool,
+    /// Weight of the residual's mean square [default: the reference's 0.001]
+    #[arg(long)]
+    pub penalty: Option<f64>,
+    /// Stop after so many epochs without a better held-out loss
+    #[arg(long)]
+    pub patience: Option<usize>,
+    /// Time of a step, s
+    #[arg(long, default_value_t = gapscope_network::Learner::DT)]
+    pub dt: f64,
+    /// Draws initial weights and the order of the data
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+}
+
+fn on(text: &str) -> Result<On, String> {
+    match text {
+        "next-state" => Ok(On::NextState),
+        "acceleration" => Ok(On::Acceleration),
+        "torque" => Ok(On::Torque),
+        _ => Err("expected next-state, acceleration or torque".into()),
+    }
+}
+
+/// Which study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Topic {
+    /// Error against number of samples, at several sizes of mismatch
+    Samples,
+    /// Inside and outside the region of the training data
+    Region,
+    /// Physics of the wrong structure: a joint is missing
+    Structure,
+    /// Data from the controller in use against data from elsewhere
+    Policy,
+}
+
+/// Arguments of `study`.
+#[derive(Debug, Args)]
+pub struct Study {
+    /// Which one
+    #[arg(value_enum)]
+    pub topic: Topic,
+    /// Folder for the table, its CSV and its picture
+    #[arg(long, default_value = "docs/studies", value_name = "DIR")]
+    pub out: PathBuf,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    pub force: bool,
+    /// Steps of training for every network
+    #[arg(long, default_value_t = 8000)]
+    pub steps: usize,
+    /// Networks trained for each figure, which is their median
+    #[arg(long, default_value_t = 3)]
+    pub repeats: u64,
 }

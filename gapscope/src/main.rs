@@ -8,8 +8,11 @@ mod evaluate;
 mod generate;
 mod input;
 mod output;
+mod picture;
 mod report;
+mod study;
 mod summary;
+mod train;
 
 use clap::Parser;
 use cli::{Cli, Command};
@@ -22,6 +25,8 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Generate(args) => generate::run(&args),
+        Command::Train(args) => train::run(&args),
+        Command::Study(args) => study::run(&args),
     };
     match result {
         Ok(text) => {

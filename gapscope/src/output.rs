@@ -45,6 +45,14 @@ pub fn new_folder(parent: &Path, name: &str) -> Result<PathBuf> {
 /// # Errors
 /// The file or its folder cannot be written.
 pub fn write(path: &Path, text: &str) -> Result<()> {
+    write_bytes(path, text.as_bytes())
+}
+
+/// As [`write`], of bytes.
+///
+/// # Errors
+/// The file or its folder cannot be written.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let fail = || format!("cannot write {}", path.display());
     std::fs::create_dir_all(folder).with_context(fail)?;
@@ -56,7 +64,7 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     let mut file = builder.tempfile_in(folder).with_context(fail)?;
-    file.write_all(text.as_bytes()).with_context(fail)?;
+    file.write_all(bytes).with_context(fail)?;
     file.persist(path).with_context(fail)?;
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! The report: one self-contained HTML page with inline SVG, no network, no scripts, the same bytes for the same input.
 
 mod answer;
-mod axis;
+pub mod axis;
 mod bars;
 mod chart;
 mod curves;

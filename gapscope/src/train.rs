@@ -1,0 +1,209 @@
+//! `gapscope train`: a residual on the robot's model, or a pure network, from logs.
+
+use crate::cli::{Kind, Train};
+use crate::input::load;
+use crate::output;
+use crate::picture::{Series, svg};
+use crate::report::axis::Axis;
+use crate::report::figure;
+use anyhow::{Context, Result, bail};
+use gapscope_datasets::transitions;
+use gapscope_dynamics::{Model, StepModel, Transitions};
+use gapscope_effects::Plant;
+use gapscope_network::{Epoch, Learner, Mlp, Net, to_json, to_onnx, to_safetensors};
+use gapscope_pure::Pure;
+use gapscope_residual::{Hybrid, On};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Part of each log, at its end, that is held out.
+const HELD_OUT: f64 = 0.2;
+/// What is written.
+const FILES: [&str; 6] = [
+    "weights.safetensors",
+    "weights.json",
+    "weights.onnx",
+    "training.json",
+    "learning_curve.csv",
+    "learning_curve.svg",
+];
+
+/// What `training.json` says.
+#[derive(Debug, Serialize)]
+struct Record<'a> {
+    schema: &'static str,
+    kind: &'static str,
+    on: Option<On>,
+    robot: &'a str,
+    joints: Vec<&'a str>,
+    /// Time of a step, s.
+    dt: f64,
+    rows: [usize; 2],
+    learner: &'a Learner,
+    best_epoch: usize,
+    /// Held-out one-step velocity error, rms over joints, rad/s or m/s.
+    held_out: Errors,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Errors {
+    physics: f64,
+    learned: f64,
+}
+
+/// Trains and writes; returns what to print.
+///
+/// # Errors
+/// Bad input or settings, or results that exist or cannot be written.
+pub fn run(args: &Train) -> Result<String> {
+    let first = args.input.logs.first().context("no log is given")?;
+    let out = folder(args, first)?;
+    let learner = learner(args)?;
+    let on = args.on.unwrap_or_default();
+    if args.kind == Kind::Pure && args.on.is_some() {
+        bail!("--on is about what a residual corrects; a pure network learns the next state");
+    }
+    if !(args.dt > 0.0 && args.dt.is_finite()) {
+        bail!("--dt is {}; expected a positive time in s", args.dt);
+    }
+    let loaded = load(&args.input)?;
+    let (mut train, mut held_out) = (Transitions::default(), Transitions::default());
+    for (i, episode) in loaded.episodes.iter().enumerate() {
+        let seen = transitions(episode, args.dt);
+        if (seen.dt - args.dt).abs() > 1e-6 * args.dt {
+            bail!("{}: steps of {} s are too short for its rate; try --dt {}", episode.name, args.dt, seen.dt);
+        }
+        if i == 0 {
+            (train, held_out) = (Transitions::new(seen.joints, args.dt), Transitions::new(seen.joints, args.dt));
+        }
+        let kept = seen.len() - (HELD_OUT * seen.len() as f64) as usize;
+        for (k, (x, tau, next)) in seen.rows().enumerate() {
+            if k < kept { &mut train } else { &mut held_out }.push(x, tau, next);
+        }
+    }
+    if train.is_empty() || held_out.is_empty() {
+        bail!("the logs hold {} steps of {} s; at least 10 are needed", train.len() + held_out.len(), args.dt);
+    }
+
+    let bar = ProgressBar::new(learner.settings.epochs as u64);
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} epoch {pos} of {len}, {eta} left  {msg}") {
+        bar.set_style(style);
+    }
+    let mut heard = |epoch: &Epoch| {
+        bar.set_position(epoch.epoch as u64);
+        bar.set_message(format!("loss {:.2e}, held out {:.2e}", epoch.train, epoch.held_out.unwrap_or(f64::NAN)));
+    };
+    let mut physics = Plant::nominal(&loaded.model, args.dt);
+    let before = velocity_rms(&held_out, &mut physics);
+    let (trained, after) = match args.kind {
+        Kind::Residual => {
+            let trained =
+                gapscope_residual::learn::<f32>(&mut physics, &train, Some(&held_out), on, &learner, None, &mut heard)?;
+            let mut hybrid = Hybrid::new(physics, Net::new(trained.network.clone()), on)?;
+            let after = velocity_rms(&held_out, &mut hybrid);
+            (trained, after)
+        }
+        Kind::Pure => {
+            let trained = gapscope_pure::learn::<f32>(&train, Some(&held_out), &learner, &mut heard)?;
+            let mut pure = Pure::new(train.joints, args.dt, Net::new(trained.network.clone()))?;
+            let after = velocity_rms(&held_out, &mut pure);
+            (trained, after)
+        }
+    };
+    bar.finish_and_clear();
+
+    let errors = Errors { physics: before, learned: after };
+    let record = Record {
+        schema: "gapscope.training/1",
+        kind: args.kind.name(),
+        on: (args.kind == Kind::Residual).then_some(on),
+        robot: loaded.model.name(),
+        joints: names(&loaded.model),
+        dt: args.dt,
+        rows: [train.len(), held_out.len()],
+        learner: &learner,
+        best_epoch: trained.best,
+        held_out: errors,
+    };
+    write(&out, &trained.network, &trained.history, &record)?;
+    let what = if args.kind == Kind::Residual { "physics and residual" } else { "pure network" };
+    Ok(format!(
+        "{} steps of {} s, {} of them held out; best epoch {} of {}\nHeld-out one-step velocity error, rms: physics {}, {what} {}\nWeights  {}",
+        train.len() + held_out.len(),
+        args.dt,
+        held_out.len(),
+        trained.best,
+        trained.history.len(),
+        figure(before),
+        figure(after),
+        out.join(FILES[0]).display()
+    ))
+}
+
+fn folder(args: &Train, first: &std::path::Path) -> Result<PathBuf> {
+    let Some(out) = &args.out else {
+        let parent = first.parent().unwrap_or(std::path::Path::new(""));
+        return output::new_folder(parent, &format!("{}.trained", args.kind.name()));
+    };
+    if let (Some(name), false) = (FILES.iter().find(|name| out.join(name).exists()), args.force) {
+        bail!(
+            "{} exists already; choose another folder with --out, or allow it to be replaced with --force",
+            out.join(name).display()
+        );
+    }
+    Ok(out.clone())
+}
+
+fn learner(args: &Train) -> Result<Learner> {
+    let names = Learner::NAMES.join(", ");
+    let unknown = || format!("no reference configuration {:?}; there are {names}", args.reference);
+    let mut learner = Learner::named(&args.reference).with_context(unknown)?;
+    let settings = &mut learner.settings;
+    settings.epochs = args.epochs;
+    settings.seed = args.seed;
+    settings.cosine = args.cosine;
+    settings.patience = args.patience;
+    settings.batch = args.batch.unwrap_or(settings.batch);
+    settings.penalty = args.penalty.unwrap_or(settings.penalty);
+    settings.adam.rate = args.rate.unwrap_or(settings.adam.rate);
+    if !args.hidden.is_empty() {
+        learner.hidden.clone_from(&args.hidden);
+    }
+    Ok(learner)
+}
+
+fn names(model: &Model) -> Vec<&str> {
+    model.joints().iter().map(|j| j.name.as_str()).collect()
+}
+
+/// Rms of the velocities' one-step error over rows and joints, rad/s or m/s.
+pub fn velocity_rms(seen: &Transitions, model: &mut dyn StepModel) -> f64 {
+    let n = seen.joints;
+    let errors = seen.one_step_errors(model);
+    let sum: f64 = errors.chunks_exact(2 * n).flat_map(|e| &e[n..]).map(|e| e * e).sum();
+    (sum / (seen.len() * n).max(1) as f64).sqrt()
+}
+
+fn write(out: &std::path::Path, network: &Mlp<f32>, history: &[Epoch], record: &Record<'_>) -> Result<()> {
+    output::write_bytes(&out.join(FILES[0]), &to_safetensors(network)?)?;
+    output::write(&out.join(FILES[1]), &to_json(network)?)?;
+    output::write_bytes(&out.join(FILES[2]), &to_onnx(network))?;
+    output::write(&out.join(FILES[3]), &serde_json::to_string_pretty(record)?)?;
+    let mut table = String::from("epoch,train,held_out\n");
+    for e in history {
+        let _ = writeln!(table, "{},{},{}", e.epoch, e.train, e.held_out.unwrap_or(f64::NAN));
+    }
+    output::write(&out.join(FILES[4]), &table)?;
+    let line = |name: &str, of: &dyn Fn(&Epoch) -> f64| Series {
+        name: name.into(),
+        points: history.iter().map(|e| [e.epoch as f64, of(e)]).collect(),
+        dashed: false,
+        dots: false,
+    };
+    let series = [line("training rows", &|e| e.train), line("held out", &|e| e.held_out.unwrap_or(f64::NAN))];
+    let x = Axis::tight([0.0, history.len() as f64], "epoch", 6);
+    let y = Axis::powers(series.iter().flat_map(|s| &s.points).map(|p| p[1]), "loss, targets of variance one");
+    output::write(&out.join(FILES[5]), &svg(&format!("{} network, {}", record.kind, record.robot), &x, &y, &series))
+}

@@ -21,6 +21,16 @@ pub enum Command {
     Evaluate(Evaluate),
     /// Diagnose a withheld effect on the built-in 7-joint arm, then reveal it
     Demo(Demo),
+    /// Make cases with a sealed effect, and score how well it is found
+    #[command(subcommand)]
+    Withheld(Withheld),
+}
+
+/// What to do with withheld cases.
+#[derive(Debug, Subcommand)]
+pub enum Withheld {
+    /// Diagnose the cases of a bank, then open the sealed truth
+    Score(ScoreBank),
 }
 
 /// Which robot and logs.
@@ -91,4 +101,33 @@ pub struct Demo {
     /// Folder for the logs and the results [default: a new folder in the current one]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// Arguments of `withheld score`.
+#[derive(Debug, Args)]
+pub struct ScoreBank {
+    /// Folder of cases; what is sealed lies in a folder beside it, `.sealed` behind its name
+    pub bank: PathBuf,
+    /// Binary to score [default: this one]
+    #[arg(long, value_name = "FILE")]
+    pub exe: Option<PathBuf>,
+    /// Cases diagnosed at the same time [default: one per core]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    pub jobs: Option<usize>,
+    /// Longest time that a diagnosis may take, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0)]
+    pub timeout: f64,
+    /// Print one JSON object and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// Folder for score.json and score.html
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    pub force: bool,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above zero".to_owned())
 }

@@ -9,6 +9,7 @@ mod input;
 mod output;
 mod report;
 mod summary;
+mod withheld;
 
 use clap::Parser;
 use cli::{Cli, Command};
@@ -20,6 +21,7 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Demo(args) => demo::run(&args),
+        Command::Withheld(args) => withheld::run(&args),
     };
     match result {
         Ok(text) => {

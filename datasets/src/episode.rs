@@ -164,6 +164,21 @@ impl Episode {
         }
         part
     }
+
+    /// Leaves out the samples that are not `kept`.
+    pub(crate) fn keep_samples(&mut self, kept: &[bool]) {
+        let keep = |row: &mut Vec<f64>| {
+            let mut flags = kept.iter();
+            row.retain(|_| flags.next().is_none_or(|&kept| kept));
+        };
+        keep(&mut self.time);
+        for channel in Channel::ALL {
+            if let Some(mut samples) = self.channel(channel).cloned() {
+                samples.iter_mut().for_each(keep);
+                self.set_channel(channel, samples);
+            }
+        }
+    }
 }
 
 #[cfg(test)]

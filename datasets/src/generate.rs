@@ -1,126 +1,183 @@
 //! Logs of a simulated robot with effects that its model lacks: closed loop, sampled and noisy like a real one's.
 
 use crate::episode::Episode;
-use crate::motion::Fourier;
-use gapscope_dynamics::{Data, Model, StepModel};
+use crate::reference::{Reference, ReferenceError, ReferenceKind};
+use crate::sensors::Sensors;
+use crate::servo::{Controller, Servo};
+use gapscope_dynamics::{Model, StepModel};
 use gapscope_effects::{Effect, EffectError, Plant};
-use rand::{RngExt, SeedableRng};
-use rand_distr::StandardNormal;
+use rand::SeedableRng;
 use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
 
-/// Servo: natural frequency, rad/s, and damping ratio of each joint's tracking error.
-const SERVO: (f64, f64) = (35.0, 0.9);
 /// Physics steps per sample of the log.
 const SUBSTEPS: usize = 4;
+/// Most samples of an episode, so that a slip of the pen does not fill the memory.
+const SAMPLES_AT_MOST: f64 = 1e7;
+/// A joint that is so far from its reference, rad or m, is lost.
+const LOST: f64 = 1e3;
 
 /// How a log is made.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Recipe {
     /// Length, s.
     pub seconds: f64,
     /// Sampling and control rate, Hz.
     pub rate: f64,
-    /// Fundamental frequency of the motion in units of 0.1 Hz.
+    /// Family of the reference motion.
+    pub motion: ReferenceKind,
+    /// Pace of the motion; 1 is an ordinary one, and limits may slow it down.
     pub speed: f64,
-    /// Standard deviation of the encoder's noise, rad or m.
-    pub position_noise: f64,
-    /// Standard deviation of the noise of the logged effort, as a part of each joint's rms effort.
-    pub effort_noise: f64,
+    /// How the robot is made to follow it.
+    pub servo: Servo,
+    /// Whether the encoders of elastic joints, and of joints with play, sit on the motor's side.
+    pub motor_encoders: bool,
+    /// What sensors and logger add.
+    pub sensors: Sensors,
 }
 
 impl Default for Recipe {
     fn default() -> Recipe {
-        Recipe { seconds: 10.0, rate: 500.0, speed: 1.0, position_noise: 2e-6, effort_noise: 1e-3 }
+        Recipe {
+            seconds: 10.0,
+            rate: 500.0,
+            motion: ReferenceKind::default(),
+            speed: 1.0,
+            servo: Servo::default(),
+            motor_encoders: false,
+            sensors: Sensors::default(),
+        }
     }
 }
 
-/// A log of the robot with `effects` tracking a random Fourier motion under computed torque of the nominal model.
-/// The same seed gives the same bytes.
+/// Why there is no log.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GenerateError {
+    /// An effect that the robot cannot have.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// No motion within the robot's limits.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// A number of the recipe that cannot be.
+    #[error("{name} is {value}, but must be {expected}")]
+    Recipe {
+        /// Which number.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// The robot did not follow.
+    #[error(
+        "joint `{joint}` of the simulated robot runs away after {time:.3} s; raise the rate, slow the motion down or make the effects smaller"
+    )]
+    RunsAway {
+        /// The joint.
+        joint: String,
+        /// When, s.
+        time: f64,
+    },
+}
+
+impl Recipe {
+    /// Length of a physics step, s: what a plant for [`record`] is made with.
+    pub fn step(&self) -> f64 {
+        1.0 / (self.rate * SUBSTEPS as f64)
+    }
+
+    fn check(&self) -> Result<(), GenerateError> {
+        let fail = |(name, value, expected)| GenerateError::Recipe { name, value, expected };
+        if !(self.rate > 0.0 && self.rate.is_finite()) {
+            return Err(fail(("rate", self.rate, "a positive number")));
+        }
+        if !(self.seconds > 0.0 && self.seconds * self.rate <= SAMPLES_AT_MOST) {
+            return Err(fail(("seconds", self.seconds, "positive, and no more than ten million samples")));
+        }
+        self.sensors.check().map_err(fail)
+    }
+}
+
+/// A log of the robot with `effects` following a reference under a servo that knows the nominal model.
+/// The same seed gives the same bytes. Allocates.
 ///
 /// # Errors
-/// An effect that the robot cannot have.
+/// An effect that the robot cannot have, limits that leave no motion, a recipe with an impossible number, or a robot that runs
+/// away from its servo.
 pub fn generate(
     model: &Model,
     effects: &[Effect],
     seed: u64,
     recipe: &Recipe,
     name: &str,
-) -> Result<Episode, EffectError> {
+) -> Result<Episode, GenerateError> {
+    recipe.check()?;
+    let mut plant = Plant::new(model, effects, recipe.step())?;
+    if recipe.motor_encoders {
+        plant = plant.with_motor_encoders();
+    }
+    record(model, effects, &mut plant, seed, recipe, name)
+}
+
+/// [`generate`] with any plant, one that has other laws than the catalogue's, say. Its step must be [`Recipe::step`].
+/// `effects` are those that the servo was commissioned with.
+///
+/// # Errors
+/// As [`generate`].
+pub fn record(
+    model: &Model,
+    effects: &[Effect],
+    plant: &mut dyn StepModel,
+    seed: u64,
+    recipe: &Recipe,
+    name: &str,
+) -> Result<Episode, GenerateError> {
+    recipe.check()?;
     let n = model.dof();
     let dt = 1.0 / recipe.rate;
     let mut random = Pcg64::seed_from_u64(seed ^ 0x5eed_0f10_6000_0001);
-    let mut normal = || random.sample::<f64, _>(StandardNormal);
-    let mut plant = Plant::new(model, effects, dt / SUBSTEPS as f64)?;
-    let motion = Fourier::within_limits(model, seed, recipe.speed);
-    let mut data = Data::new(model);
+    let reference = Reference::draw(recipe.motion, model, seed, recipe.speed, recipe.seconds)?;
+    let mut servo = Controller::new(model, effects, recipe.servo, &reference, recipe.seconds, dt)?;
     let samples = (recipe.seconds * recipe.rate).round().max(2.0) as usize;
     let empty = || vec![Vec::with_capacity(samples); n];
-    let mut episode = Episode {
-        name: name.to_owned(),
-        joints: model.joints().iter().map(|j| j.name.clone()).collect(),
-        time: (0..samples).map(|k| k as f64 * dt).collect(),
-        position: empty(),
-        effort: empty(),
-        command: Some(empty()),
-        ..Episode::default()
-    };
+    let (mut position, mut logged, mut command) = (empty(), empty(), empty());
+    let [mut target, mut target_v, mut target_a] = std::array::from_fn(|_| vec![0.0; n]);
+    let [mut measured, mut before, mut velocity, mut effort] = std::array::from_fn(|_| vec![0.0; n]);
+    reference.at_into(0.0, &mut target, &mut target_v, &mut target_a);
     let mut x = vec![0.0; plant.state_len()];
-    let (q0, v0, _) = motion.at(0.0);
-    plant.start(&q0, &v0, &mut x);
-    let (frequency, damping) = SERVO;
-    let mut effort = vec![0.0; n];
-    let mut previous: Option<Vec<f64>> = None;
-    for &t in &episode.time {
-        let (reference, reference_v, reference_a) = motion.at(t);
-        let measured: Vec<f64> = x[..n].iter().map(|q| q + recipe.position_noise * normal()).collect();
-        // The servo differentiates its encoder, as drives do; at the first sample it trusts the reference.
-        let velocity: Vec<f64> = match &previous {
-            Some(before) => measured.iter().zip(before).map(|(q, before)| (q - before) / dt).collect(),
-            None => reference_v.clone(),
-        };
-        let wanted: Vec<f64> = (0..n)
-            .map(|j| {
-                reference_a[j]
-                    + frequency * frequency * (reference[j] - measured[j])
-                    + 2.0 * damping * frequency * (reference_v[j] - velocity[j])
-            })
-            .collect();
-        model.inverse_dynamics(&mut data, &reference, &reference_v, &wanted, &mut effort);
+    plant.start(&target, &target_v, &mut x);
+    for k in 0..samples {
+        let time = k as f64 * dt;
+        reference.at_into(time, &mut target, &mut target_v, &mut target_a);
         for j in 0..n {
-            episode.position[j].push(measured[j]);
-            episode.effort[j].push(effort[j]);
-            if let Some(command) = &mut episode.command {
-                command[j].push(reference[j]);
+            measured[j] = recipe.sensors.position(x[j], &mut random);
+            // The servo differentiates its encoder, as drives do; at the first sample it trusts the reference.
+            velocity[j] = if k > 0 { (measured[j] - before[j]) / dt } else { target_v[j] };
+            if !((x[j] - target[j]).abs() < LOST) {
+                return Err(GenerateError::RunsAway { joint: model.joints()[j].name.clone(), time });
             }
         }
-        previous = Some(measured);
+        servo.effort([&target, &target_v, &target_a], &measured, &velocity, &mut effort);
+        for j in 0..n {
+            position[j].push(measured[j]);
+            logged[j].push(effort[j]);
+            command[j].push(target[j]);
+        }
+        std::mem::swap(&mut measured, &mut before);
         for _ in 0..SUBSTEPS {
             plant.step(&mut x, &effort);
         }
     }
-    for row in &mut episode.effort {
-        let rms = (row.iter().map(|e| e * e).sum::<f64>() / samples as f64).sqrt();
-        for effort in row {
-            *effort += recipe.effort_noise * rms * normal();
-        }
-    }
-    Ok(episode)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use gapscope_dynamics::robots;
-
-    #[test]
-    fn the_robot_tracks_its_reference_and_the_same_seed_gives_the_same_log() {
-        let model = robots::model("arm7").unwrap().unwrap().model;
-        let recipe = Recipe { seconds: 2.0, ..Recipe::default() };
-        let log = generate(&model, &[], 7, &recipe, "a.csv").unwrap();
-        for (q, command) in log.position.iter().zip(log.command.as_ref().unwrap()) {
-            assert!(q.iter().zip(command).all(|(q, c)| (q - c).abs() < 0.02));
-        }
-        assert_eq!(log, generate(&model, &[], 7, &recipe, "a.csv").unwrap());
-        assert_ne!(log.position, generate(&model, &[], 8, &recipe, "a.csv").unwrap().position);
-    }
+    let episode = Episode {
+        name: name.to_owned(),
+        joints: model.joints().iter().map(|j| j.name.clone()).collect(),
+        time: (0..samples).map(|k| k as f64 * dt).collect(),
+        position,
+        effort: logged,
+        command: Some(command),
+        ..Episode::default()
+    };
+    Ok(recipe.sensors.log(episode, &mut random))
 }

@@ -1,7 +1,7 @@
 //! What the validations that cross crates share: robots, simulated logs, real logs.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gapscope_datasets::{ColumnMap, Episode, ReadOptions, Recipe, generate, read_logs};
+use gapscope_datasets::{ColumnMap, Episode, ReadOptions, Recipe, Sensors, generate, read_logs};
 use gapscope_diagnosis::Outcome;
 use gapscope_dynamics::{Model, robots};
 use gapscope_effects::Effect;
@@ -20,7 +20,8 @@ pub fn robot(name: &str) -> Model {
 /// # Panics
 /// Where the robot cannot have the effects.
 pub fn simulate(model: &Model, effects: &[Effect], seed: u64, seconds: f64, rate: f64, noise: f64) -> Episode {
-    let recipe = Recipe { seconds, rate, position_noise: noise, ..Recipe::default() };
+    let sensors = Sensors { position_noise: noise, ..Sensors::default() };
+    let recipe = Recipe { seconds, rate, sensors, ..Recipe::default() };
     generate(model, effects, seed, &recipe, &format!("log_{seed}.csv")).expect("effects that the robot can have")
 }
 

@@ -29,6 +29,8 @@ pub enum Command {
 /// What to do with withheld cases.
 #[derive(Debug, Subcommand)]
 pub enum Withheld {
+    /// Make a bank of cases; an interrupted one is gone on with
+    Make(MakeBank),
     /// Diagnose the cases of a bank, then open the sealed truth
     Score(ScoreBank),
 }
@@ -101,6 +103,57 @@ pub struct Demo {
     /// Folder for the logs and the results [default: a new folder in the current one]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// Arguments of `withheld make`.
+#[derive(Debug, Args)]
+pub struct MakeBank {
+    /// Folder for the cases; what is sealed goes into a folder beside it, `.sealed` behind its name
+    pub out: PathBuf,
+    /// Cases with one effect, each kind as often as the next [default, with no count given: one case of each kind]
+    #[arg(long, value_name = "N")]
+    pub cases: Option<usize>,
+    /// Cases with two to four effects
+    #[arg(long, value_name = "N")]
+    pub multi: Option<usize>,
+    /// Cases with one effect and a law that the catalogue does not have
+    #[arg(long, value_name = "N")]
+    pub mixed: Option<usize>,
+    /// Cases without an effect
+    #[arg(long, value_name = "N")]
+    pub none: Option<usize>,
+    /// Cases with a law that the catalogue does not have
+    #[arg(long, value_name = "N")]
+    pub unknown: Option<usize>,
+    /// Robots, taken in turn: arm7, arm6, double_pendulum, or URDF files
+    #[arg(long, value_name = "ROBOT,…", value_delimiter = ',', default_value = "arm7")]
+    pub robots: Vec<String>,
+    /// Everything is drawn from this number
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// How large the effects are
+    #[arg(long, value_enum, default_value_t = Level::Mixed)]
+    pub difficulty: Level,
+    /// Length of an episode
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    pub seconds: f64,
+    /// Logs per case
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub episodes: usize,
+    /// Sealed test episodes per case
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub tests: usize,
+}
+
+/// How large effects are, in units that suit the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Level {
+    /// 0.8 to 2
+    Easy,
+    /// 0.25 to 0.8
+    Hard,
+    /// 0.3 to 2
+    Mixed,
 }
 
 /// Arguments of `withheld score`.

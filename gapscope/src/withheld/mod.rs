@@ -1,6 +1,7 @@
 //! `gapscope withheld`: cases whose hidden effect is sealed, and how well a binary names it.
 
 mod bank;
+mod make;
 mod score;
 mod table;
 
@@ -13,6 +14,7 @@ use anyhow::Result;
 /// A bank that is not one, or results that exist or cannot be written.
 pub fn run(args: &Withheld) -> Result<String> {
     match args {
+        Withheld::Make(args) => make::run(args),
         Withheld::Score(args) => score::run(args),
     }
 }

@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 /// Noise of a fine, an ordinary and a coarse robot: encoder, rad (m), and logged effort as a part of its rms.
-const NOISE: [(f64, f64); 3] = [(1e-7, 5e-5), (2e-6, 1e-3), (1e-5, 4e-3)];
+const NOISE: [(f64, f64); 3] = [(1e-7, 1e-4), (2e-6, 2e-3), (1e-5, 1e-2)];
 /// Paces of the motions.
 const SPEED: [f64; 3] = [0.6, 1.0, 1.5];
 /// Draws before a case is given up.
@@ -212,4 +212,92 @@ fn strays(log: &Episode) -> bool {
 fn clipped(logs: &[Episode], joint: usize, limit: f64) -> f64 {
     let efforts = || logs.iter().flat_map(|log| &log.effort[joint]);
     efforts().filter(|effort| effort.abs() > limit).count() as f64 / efforts().count().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outside::Outside;
+    use crate::truth::DETECTABLE;
+    use gapscope_dynamics::{Model, robots};
+    use std::f64::consts::TAU;
+
+    fn robot(name: &str) -> Robot {
+        let urdf = robots::urdf(name).unwrap();
+        Robot::new(name.into(), urdf.into(), Model::from_urdf(urdf).unwrap().model).unwrap()
+    }
+
+    fn spec(sorts: Vec<Sort>, seed: u64) -> CaseSpec {
+        CaseSpec { sorts, seed, difficulty: Difficulty::Mixed, seconds: 3.0, episodes: 1, tests: 1 }
+    }
+
+    #[test]
+    fn a_hum_is_in_the_log_as_the_law_says() {
+        let robot = robot("double_pendulum");
+        let mut hum = draw(Sort::Unknown(2), &robot, Difficulty::Easy, 1, 3.0, &mut Pcg64::seed_from_u64(1));
+        let law = Outside::Hum { joint: 1, amplitude: 0.2, frequency: 1.0, phase: 0.3 };
+        hum.outside = Some(law);
+        let recipe = Recipe { seconds: 3.0, sensors: Sensors::IDEAL, ..Recipe::default() };
+        let rest = residual(&robot.model, &simulate(&robot, &[hum], 0, 4, &recipe).unwrap());
+        let bare = residual(&robot.model, &simulate(&robot, &[], 0, 4, &recipe).unwrap());
+        for k in 100..1300 {
+            // Effort makes up for what the law does; row k is sample k + 1.
+            let law = -0.2 * (TAU * (k + 1) as f64 / 500.0 + 0.3).sin();
+            assert!((rest[1][k] - bare[1][k] - law).abs() < 0.01, "{k}: {} {law}", rest[1][k] - bare[1][k]);
+            assert!((rest[0][k] - bare[0][k]).abs() < 0.01);
+        }
+    }
+
+    #[test]
+    fn what_drags_takes_energy_and_what_sloshes_gives_it_back() {
+        let robot = robot("double_pendulum");
+        let recipe = Recipe { seconds: 4.0, sensors: Sensors::IDEAL, ..Recipe::default() };
+        let work = |which: usize| {
+            let law = draw(Sort::Unknown(which), &robot, Difficulty::Easy, 1, 4.0, &mut Pcg64::seed_from_u64(2));
+            let log = simulate(&robot, &[law], 0, 4, &recipe).unwrap();
+            let rest = residual(&robot.model, &log);
+            let (mut lost, mut moved) = (0.0, 0.0);
+            for (q, rest) in log.position.iter().zip(&rest) {
+                for k in 50..rest.len() - 50 {
+                    let power = rest[k] * (q[k + 2] - q[k]);
+                    (lost, moved) = (lost + power, moved + power.abs());
+                }
+            }
+            lost / moved
+        };
+        for (which, law) in crate::UNKNOWN.iter().enumerate() {
+            let share = work(which);
+            match *law {
+                "unknown_tip_drag" => assert!(share > 0.8, "{law}: {share}"),
+                // It rubs for a short while; the smoothing blurs the rest.
+                "unknown_rub_spot" => assert!(share > 0.2, "{law}: {share}"),
+                "unknown_slosh" => assert!(share.abs() < 0.6, "{law}: {share}"),
+                _ => {}
+            }
+        }
+    }
+
+    #[test]
+    fn every_kind_and_every_law_makes_a_case_that_shows_it() {
+        let robot = robot("arm6");
+        let known = Kind::ALL.into_iter().map(Sort::Known);
+        for (seed, sort) in known.chain((0..crate::UNKNOWN.len()).map(Sort::Unknown)).enumerate() {
+            let case = make_case(&robot, &spec(vec![sort], seed as u64)).unwrap_or_else(|e| panic!("{e}"));
+            let [effect] = case.truth.effects.as_slice() else { panic!("{:?}", case.truth) };
+            assert_eq!(effect.kind, sort.name());
+            assert_eq!((case.episodes.len(), case.tests.len()), (1, 1));
+            assert!(effect.joints.iter().map(|&j| robot.joint(j)).eq(effect.joint_names.iter().cloned()));
+            match effect.visibility() {
+                Some(power) => assert!(power > DETECTABLE, "{}: {power}", effect.kind),
+                None => assert_eq!(sort, Sort::Known(Kind::TorqueSaturation)),
+            }
+        }
+    }
+
+    #[test]
+    fn a_case_without_an_effect_has_no_truth_but_its_noise() {
+        let case = make_case(&robot("double_pendulum"), &spec(vec![], 3)).unwrap();
+        assert_eq!((case.truth.kinds.as_slice(), case.truth.effects.len()), (["none".to_owned()].as_slice(), 0));
+        assert!(case.truth.known && case.truth.noise.iter().all(|noise| *noise > 0.0));
+    }
 }

@@ -10,6 +10,7 @@ use gapscope_effects::{Effect, Kind, Plant};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use serde_json::Value;
 
 /// Noise of a fine, an ordinary and a coarse robot: encoder, rad (m), and logged effort as a part of its rms.
 const NOISE: [(f64, f64); 3] = [(1e-7, 1e-4), (2e-6, 2e-3), (1e-5, 1e-2)];
@@ -20,7 +21,9 @@ const ATTEMPTS: usize = 12;
 /// A robot that strays further from its reference has not followed it, rad (m).
 const ASTRAY: f64 = 0.6;
 /// Least share of the samples that a saturation must clip.
-const CLIPPED: f64 = 0.02;
+const CLIPPED: f64 = 0.005;
+/// What each draw leaves of the share that the last one clipped: a robot clipped too hard falls.
+const MILDER: f64 = 0.8;
 /// Joints of greatest effort among which a saturation picks its own.
 const STRONGEST: usize = 3;
 
@@ -75,8 +78,9 @@ pub fn make_case(robot: &Robot, spec: &CaseSpec) -> Result<Case, CaseError> {
     let mut random = Pcg64::seed_from_u64(spec.seed);
     let level = NOISE[random.random_range(0..NOISE.len())];
     let mut last = String::new();
-    for _ in 0..ATTEMPTS {
-        match attempt(robot, spec, level, &mut random) {
+    for number in 0..ATTEMPTS {
+        let clip = MILDER.powi(number as i32);
+        match attempt(robot, spec, level, clip, &mut random) {
             Ok(Some(case)) => return Ok(case),
             Ok(None) => last = format!("more than {ASTRAY} rad off, or a saturation that does not bite"),
             Err(error) => last = error.to_string(),
@@ -86,11 +90,12 @@ pub fn make_case(robot: &Robot, spec: &CaseSpec) -> Result<Case, CaseError> {
     Err(CaseError::NoDraw { robot: robot.name.clone(), kinds: kinds.join(", "), last })
 }
 
-/// One draw; `None` where the robot did not follow or a saturation did not clip.
+/// One draw; `None` where the robot did not follow or a saturation did not clip. `clip` makes saturations milder.
 fn attempt(
     robot: &Robot,
     spec: &CaseSpec,
     (position_noise, effort_noise): (f64, f64),
+    clip: f64,
     random: &mut Pcg64,
 ) -> Result<Option<Case>, GenerateError> {
     let count = spec.episodes + spec.tests;
@@ -107,7 +112,9 @@ fn attempt(
     if let Some(which) = saturated {
         let log = simulate(robot, &drawn, 0, seeds[count], &quiet)?;
         let joint = strongest(&log, random);
-        let quantile = drawn[which].sealed.parameters.get("quantile").and_then(|q| q.as_f64()).unwrap_or(0.9);
+        let share = 1.0 - drawn[which].sealed.parameters.get("quantile").and_then(Value::as_f64).unwrap_or(0.9);
+        let quantile = 1.0 - clip * share;
+        drawn[which].sealed.parameters.insert("quantile".into(), quantile.into());
         let mut sizes: Vec<f64> = log.effort[joint].iter().map(|effort| effort.abs()).collect();
         sizes.sort_by(f64::total_cmp);
         let at = sizes[(quantile * (sizes.len() - 1) as f64).round() as usize];

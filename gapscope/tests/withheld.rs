@@ -193,7 +193,7 @@ fn a_bank_without_its_truth_and_binaries_that_do_not_answer_are_told() {
     refused(&score(&folder.path().join("bank"), &[]), &["cannot find the bank"]);
     let bank = small(folder.path());
     refused(&score(&bank, &["--exe", "/no/such/binary"]), &["/no/such/binary"]);
-    refused(&score(&bank, &["--timeout", "-1"]), &["--timeout"]);
+    refused(&score(&bank, &["--timeout", "0"]), &["--timeout"]);
     let silent = score(&bank, &["--exe", "/bin/false", "--json"]);
     assert!(silent.status.success());
     let json: Value = serde_json::from_slice(&silent.stdout).unwrap();

@@ -29,6 +29,18 @@ pub enum Command {
     Train(Train),
     /// Measure what residual and pure learning need and where they fail, on a simulated arm
     Study(Study),
+    /// Make cases with a sealed effect, and score how well it is found
+    #[command(subcommand)]
+    Withheld(Withheld),
+}
+
+/// What to do with withheld cases.
+#[derive(Debug, Subcommand)]
+pub enum Withheld {
+    /// Make a bank of cases; an interrupted one is gone on with
+    Make(MakeBank),
+    /// Diagnose the cases of a bank, then open the sealed truth
+    Score(ScoreBank),
 }
 
 /// Which robot and logs.
@@ -212,6 +224,8 @@ impl From<Drive> for Servo {
             Drive::Pd => Servo::Pd,
         }
     }
+}
+
 /// What is trained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
@@ -318,4 +332,84 @@ pub struct Study {
     /// Networks trained for each figure, which is their median
     #[arg(long, default_value_t = 3)]
     pub repeats: u64,
+}
+
+/// Arguments of `withheld make`.
+#[derive(Debug, Args)]
+pub struct MakeBank {
+    /// Folder for the cases; what is sealed goes into a folder beside it, `.sealed` behind its name
+    pub out: PathBuf,
+    /// Cases with one effect, each kind as often as the next [default, with no count given: one case of each kind]
+    #[arg(long, value_name = "N")]
+    pub cases: Option<usize>,
+    /// Cases with two to four effects
+    #[arg(long, value_name = "N")]
+    pub multi: Option<usize>,
+    /// Cases with one effect and a law that the catalogue does not have
+    #[arg(long, value_name = "N")]
+    pub mixed: Option<usize>,
+    /// Cases without an effect
+    #[arg(long, value_name = "N")]
+    pub none: Option<usize>,
+    /// Cases with a law that the catalogue does not have
+    #[arg(long, value_name = "N")]
+    pub unknown: Option<usize>,
+    /// Robots, taken in turn: arm7, arm6, double_pendulum, or URDF files
+    #[arg(long, value_name = "ROBOT,…", value_delimiter = ',', default_value = "arm7")]
+    pub robots: Vec<String>,
+    /// Everything is drawn from this number
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// How large the effects are
+    #[arg(long, value_enum, default_value_t = Level::Mixed)]
+    pub difficulty: Level,
+    /// Length of an episode
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    pub seconds: f64,
+    /// Logs per case
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub episodes: usize,
+    /// Sealed test episodes per case
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub tests: usize,
+}
+
+/// How large effects are, in units that suit the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Level {
+    /// 0.8 to 2
+    Easy,
+    /// 0.25 to 0.8
+    Hard,
+    /// 0.3 to 2
+    Mixed,
+}
+
+/// Arguments of `withheld score`.
+#[derive(Debug, Args)]
+pub struct ScoreBank {
+    /// Folder of cases; what is sealed lies in a folder beside it, `.sealed` behind its name
+    pub bank: PathBuf,
+    /// Binary to score [default: this one]
+    #[arg(long, value_name = "FILE")]
+    pub exe: Option<PathBuf>,
+    /// Cases diagnosed at the same time [default: one per core]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    pub jobs: Option<usize>,
+    /// Longest time that a diagnosis may take, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0)]
+    pub timeout: f64,
+    /// Print one JSON object and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// Folder for score.json and score.html
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    pub force: bool,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above zero".to_owned())
 }

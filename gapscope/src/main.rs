@@ -13,6 +13,7 @@ mod report;
 mod study;
 mod summary;
 mod train;
+mod withheld;
 
 use clap::Parser;
 use cli::{Cli, Command};
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         Command::Generate(args) => generate::run(&args),
         Command::Train(args) => train::run(&args),
         Command::Study(args) => study::run(&args),
+        Command::Withheld(args) => withheld::run(&args),
     };
     match result {
         Ok(text) => {

@@ -30,6 +30,8 @@ pub(super) struct Scratch {
     force: Vec<f64>,
     /// Mean torque of the contacts over the step, N m, n, at the position where the dynamics are evaluated.
     contact: Vec<f64>,
+    /// Torque from outside the plant, N m, n; held over the step.
+    outside: Vec<f64>,
 }
 
 impl Scratch {
@@ -49,6 +51,7 @@ impl Scratch {
             v_end,
             force,
             contact: vec![0.0; joints],
+            outside: vec![0.0; joints],
         }
     }
 }
@@ -66,7 +69,7 @@ impl Plant {
         s.mass.view_mut((0, 0), (n, n)).copy_from(&s.link_mass);
         for j in 0..n {
             let spring = self.stiffness[j] * (s.q_start[j] + 0.5 * h * s.v_start[j]) - self.spring_torque[j];
-            s.force[j] = h * (s.delivered[j] + s.contact[j] - s.force[j] - spring);
+            s.force[j] = h * (s.delivered[j] + s.contact[j] + s.outside[j] - s.force[j] - spring);
             s.mass[(j, j)] += 0.25 * h * h * self.stiffness[j];
         }
         for ripple in &self.ripples {
@@ -199,26 +202,19 @@ impl Plant {
             }
         }
     }
-}
 
-impl StepModel for Plant {
-    fn joints(&self) -> usize {
-        self.model.dof()
+    /// [`StepModel::step`] with a joint torque from outside, N m (N), held over the step: what a law that the catalogue
+    /// lacks does to the links. It goes through no drive. Slices are those of a step, `outside` has length n. Allocates nothing.
+    ///
+    /// # Panics
+    /// If a slice has another length.
+    pub fn step_with(&mut self, x: &mut [f64], tau: &[f64], outside: &[f64]) {
+        self.scratch.outside.copy_from_slice(outside);
+        self.advance(x, tau);
     }
 
-    fn dt(&self) -> f64 {
-        self.dt
-    }
-
-    fn state_len(&self) -> usize {
-        self.layout().len()
-    }
-
-    fn start(&self, q: &[f64], v: &[f64], x: &mut [f64]) {
-        self.start_at(0.0, q, v, x);
-    }
-
-    fn step(&mut self, x: &mut [f64], tau: &[f64]) {
+    /// A step under the logged effort `tau` and the torque in `scratch.outside`.
+    fn advance(&mut self, x: &mut [f64], tau: &[f64]) {
         let h = self.dt;
         let State { q, v, clock, history, lagged, bristles, wind_up } = self.layout().split(x);
         let time = clock.first().copied().unwrap_or(0.0);
@@ -255,5 +251,28 @@ impl StepModel for Plant {
             *time += self.dt;
             *filled = 1.0;
         }
+    }
+}
+
+impl StepModel for Plant {
+    fn joints(&self) -> usize {
+        self.model.dof()
+    }
+
+    fn dt(&self) -> f64 {
+        self.dt
+    }
+
+    fn state_len(&self) -> usize {
+        self.layout().len()
+    }
+
+    fn start(&self, q: &[f64], v: &[f64], x: &mut [f64]) {
+        self.start_at(0.0, q, v, x);
+    }
+
+    fn step(&mut self, x: &mut [f64], tau: &[f64]) {
+        self.scratch.outside.fill(0.0);
+        self.advance(x, tau);
     }
 }

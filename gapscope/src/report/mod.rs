@@ -10,6 +10,7 @@ mod format;
 mod heatmap;
 mod joints;
 mod rest;
+mod score;
 mod series;
 mod shrink;
 pub mod terminal;
@@ -28,6 +29,7 @@ pub use format::{
     NONE, count, estimate, figure, percent, percent_figure, percent_interval, plain, probability_figure, significant,
     span, with_unit,
 };
+pub use score::html as score;
 pub use words::{
     capital, effect, implied_unit, interval, joints as joint_list, motion_unit, outstanding, regime, said_of, verdict,
 };
@@ -40,6 +42,16 @@ const STYLE: &str = include_str!("style.css");
 /// Figures that are not numbers print as a dash; names from the user's files are escaped.
 pub fn html(diagnosis: &Diagnosis, evidence: &Evidence) -> String {
     let sentences = answer::sentences(diagnosis, evidence);
+    let title = format!("{}, {}", diagnosis.robot, words::verdict(diagnosis.verdict));
+    let content = html! {
+        (header(diagnosis, &sentences))
+        main { (body(diagnosis, evidence)) }
+    };
+    page(&title, &content, &diagnosis.schema)
+}
+
+/// One self-contained page.
+fn page(title: &str, content: &Markup, schema: &str) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -48,13 +60,12 @@ pub fn html(diagnosis: &Diagnosis, evidence: &Evidence) -> String {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 meta name="generator" content={ "gapscope " (env!("CARGO_PKG_VERSION")) };
-                title { "gapscope: " (diagnosis.robot) ", " (words::verdict(diagnosis.verdict)) }
+                title { "gapscope: " (title) }
                 style { (PreEscaped(STYLE)) }
             }
             body {
-                (header(diagnosis, &sentences))
-                main { (body(diagnosis, evidence)) }
-                footer { "gapscope " (env!("CARGO_PKG_VERSION")) " · " (diagnosis.schema) }
+                (content)
+                footer { "gapscope " (env!("CARGO_PKG_VERSION")) " · " (schema) }
             }
         }
     };

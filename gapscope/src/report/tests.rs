@@ -168,3 +168,24 @@ fn very_long_logs_stay_small() {
     let page = html(&diagnosis, &evidence);
     assert!(page.len() < 2_000_000, "{} bytes", page.len());
 }
+
+#[test]
+fn the_page_of_a_score_is_well_formed_and_finite() {
+    use gapscope_withheld::{Answer, CaseScore, Score, Truth, judge};
+    let golden: serde_json::Value =
+        serde_json::from_str(include_str!("../../../withheld/golden/judgements.json")).unwrap();
+    let cases = golden["cases"].as_array().unwrap().iter().map(|case| {
+        let truth: Truth = serde_json::from_value(case["truth"].clone()).unwrap();
+        let answer: Option<Answer> = serde_json::from_value(case["diagnosis"].clone()).unwrap();
+        let judgement = judge(&truth, answer.as_ref(), Some(&case["evaluation"]));
+        let error = answer.is_none().then(|| "no <answer>".to_owned());
+        CaseScore::new(case["case"].as_str().unwrap(), &truth, judgement, 0.5, error)
+    });
+    for score in [Score::new(cases.collect()), Score::new(vec![])] {
+        let page = score::html(&score);
+        check_balance("score", &page);
+        for word in ["NaN", "inf<", " inf ", "None<", "Some(", "<script", "https://"] {
+            assert!(!page.contains(word), "{word}");
+        }
+    }
+}

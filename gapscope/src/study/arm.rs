@@ -3,7 +3,7 @@
 
 use crate::train::velocity_rms;
 use anyhow::{Context, Result};
-use gapscope_datasets::Fourier;
+use gapscope_datasets::{Reference, ReferenceKind};
 use gapscope_dynamics::{Data, Model, StepModel, Transitions, robots};
 use gapscope_effects::{CoulombFriction, Effect, Payload, Plant, ViscousFriction};
 use gapscope_network::{Learner, Net};
@@ -90,20 +90,27 @@ pub fn random_steps(model: &Model, truth: &mut Plant, rows: usize, scale: Option
     out
 }
 
-/// Steps along motions that a computed-torque controller tracks on the robot: new motions every 400 steps.
-pub fn controlled_steps(model: &Model, truth: &mut Plant, rows: usize, seed: u64) -> Transitions {
+/// Steps of one motion.
+const EPISODE: usize = 400;
+
+/// Steps along motions that a computed-torque controller tracks on the robot, a new one every [`EPISODE`] steps.
+///
+/// # Errors
+/// A robot for which there is no motion within limits.
+pub fn controlled_steps(model: &Model, truth: &mut Plant, rows: usize, seed: u64) -> Result<Transitions> {
     let n = model.dof();
     let mut data = Data::new(model);
     let mut out = Transitions::new(n, DT);
     let (mut x, mut tau) = (vec![0.0; truth.state_len()], vec![0.0; n]);
-    let mut motion = Fourier::within_limits(model, seed, 1.0);
+    let draw = |seed| Reference::draw(ReferenceKind::Fourier, model, seed, 1.0, EPISODE as f64 * DT);
+    let mut motion = draw(seed)?;
     for row in 0..rows {
-        let t = DT * (row % 400) as f64;
-        if row % 400 == 0 {
-            motion = Fourier::within_limits(model, 1000 * seed + row as u64, 1.0);
+        let t = DT * (row % EPISODE) as f64;
+        if row % EPISODE == 0 {
+            motion = draw(1000 * seed + row as u64)?;
         }
         let (q, v, a) = motion.at(t);
-        if row % 400 == 0 {
+        if row % EPISODE == 0 {
             truth.start(&q, &v, &mut x);
         }
         let wanted: Vec<f64> =
@@ -113,7 +120,7 @@ pub fn controlled_steps(model: &Model, truth: &mut Plant, rows: usize, seed: u64
         truth.step(&mut x, &tau);
         out.push(&before, &tau, &x);
     }
-    out
+    Ok(out)
 }
 
 /// A learner trained on `train` (a fifth of it held out to stop early) with `physics` beneath it or without, and its

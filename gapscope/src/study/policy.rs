@@ -17,7 +17,7 @@ pub fn run(budget: &Budget) -> Result<Findings> {
     let model = model()?;
     let robot = || truth(&model, 1.0);
     let tests =
-        [controlled_steps(&model, &mut robot()?, TEST, 900), random_steps(&model, &mut robot()?, TEST, None, 77)];
+        [controlled_steps(&model, &mut robot()?, TEST, 900)?, random_steps(&model, &mut robot()?, TEST, None, 77)];
     let tests = [&tests[0], &tests[1]];
     let mut jobs = Vec::new();
     for (opponent, name) in BOTH {
@@ -33,7 +33,7 @@ pub fn run(budget: &Budget) -> Result<Findings> {
             for seed in 0..budget.repeats {
                 let mut robot = robot()?;
                 let train = if data == 0 {
-                    controlled_steps(&model, &mut robot, samples, 100 + seed)
+                    controlled_steps(&model, &mut robot, samples, 100 + seed)?
                 } else {
                     random_steps(&model, &mut robot, samples, None, 100 + seed)
                 };

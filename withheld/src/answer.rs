@@ -1,0 +1,62 @@
+//! What a diagnoser answered, read as leniently as the judging allows, so that any binary can be scored.
+
+use serde::Deserialize;
+use serde_json::{Map, Value};
+
+/// The parts of a `gapscope.diagnosis/1` that are judged.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+pub struct Answer {
+    /// The answer in a word.
+    #[serde(default)]
+    pub verdict: Option<String>,
+    /// The effects named, strongest first.
+    #[serde(default)]
+    pub effects: Vec<Named>,
+    /// How far the gap shrinks, as the diagnosis predicts it.
+    #[serde(default)]
+    pub shrink: Value,
+}
+
+/// One effect that a diagnosis names.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Named {
+    /// Public name.
+    pub kind: String,
+    /// Joints affected.
+    #[serde(default)]
+    pub joints: Vec<String>,
+    /// Probability that the effect is there.
+    #[serde(default = "sure")]
+    pub confidence: f64,
+    /// Parameters by public name.
+    #[serde(default)]
+    pub parameters: Map<String, Value>,
+    /// Kinds that the log cannot tell from this one, likeliest first.
+    #[serde(default)]
+    pub indistinguishable_from: Vec<String>,
+}
+
+fn sure() -> f64 {
+    1.0
+}
+
+impl Named {
+    /// Value and 95 % interval of a parameter at a joint, or of a robot-wide one; `None` where they are not given.
+    pub fn parameter(&self, name: &str, joint: &str) -> (Option<f64>, Option<[f64; 2]>) {
+        let Some(found) = self.parameters.get(name) else { return (None, None) };
+        let found = found.get(joint).unwrap_or(found);
+        if !found.is_object() {
+            return (found.as_f64(), None);
+        }
+        let interval = found.get("ci95").and_then(Value::as_array).and_then(|ends| match ends.as_slice() {
+            [from, to] => from.as_f64().zip(to.as_f64()).map(<[f64; 2]>::from),
+            _ => None,
+        });
+        (found.get("value").and_then(Value::as_f64), interval)
+    }
+}
+
+/// The weighted torque shrink of a diagnosis or of an evaluation; `None` where it is null or missing.
+pub(crate) fn torque_shrink(shrink: &Value) -> Option<f64> {
+    shrink.get("torque")?.get("shrink")?.as_f64()
+}

@@ -1,0 +1,310 @@
+//! One case: a robot with effects drawn for it, its logs, and how visible the effects are in them.
+
+use crate::draw::{Difficulty, Drawn, Sort, draw};
+use crate::outside::Disturbed;
+use crate::robot::Robot;
+use crate::truth::Truth;
+use crate::visibility::{power, residual};
+use gapscope_datasets::{Episode, GenerateError, Recipe, Sensors, generate, record};
+use gapscope_effects::{Effect, Kind, Plant};
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde_json::Value;
+
+/// Noise of a fine, an ordinary and a coarse robot: encoder, rad (m), and logged effort as a part of its rms.
+const NOISE: [(f64, f64); 3] = [(1e-7, 1e-4), (2e-6, 2e-3), (1e-5, 1e-2)];
+/// Paces of the motions.
+const SPEED: [f64; 3] = [0.6, 1.0, 1.5];
+/// Draws before a case is given up.
+const ATTEMPTS: usize = 12;
+/// A robot that strays further from its reference has not followed it, rad (m).
+const ASTRAY: f64 = 0.6;
+/// Least share of the samples that a saturation must clip.
+const CLIPPED: f64 = 0.005;
+/// What each draw leaves of the share that the last one clipped: a robot clipped too hard falls.
+const MILDER: f64 = 0.8;
+/// Joints of greatest effort among which a saturation picks its own.
+const STRONGEST: usize = 3;
+
+/// What is asked of a case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CaseSpec {
+    /// What it is made of; nothing for a case without an effect.
+    pub sorts: Vec<Sort>,
+    /// Its seed.
+    pub seed: u64,
+    /// How large the effects are.
+    pub difficulty: Difficulty,
+    /// Length of an episode, s.
+    pub seconds: f64,
+    /// Number of logs.
+    pub episodes: usize,
+    /// Number of sealed test episodes.
+    pub tests: usize,
+}
+
+/// A case as it is handed out, and its truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Case {
+    /// The logs.
+    pub episodes: Vec<Episode>,
+    /// Sealed test episodes.
+    pub tests: Vec<Episode>,
+    /// What is sealed.
+    pub truth: Truth,
+}
+
+/// Why there is no case.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CaseError {
+    /// No log could be made of any draw.
+    #[error("{robot} with {kinds} does not follow its reference in {ATTEMPTS} draws; the last: {last}")]
+    NoDraw {
+        /// The robot.
+        robot: String,
+        /// What was drawn.
+        kinds: String,
+        /// Why the last draw failed.
+        last: String,
+    },
+}
+
+/// Makes a case. The same robot and spec give the same case, to the bit.
+///
+/// # Errors
+/// A robot that does not follow any reference with the effects, however they are drawn.
+pub fn make_case(robot: &Robot, spec: &CaseSpec) -> Result<Case, CaseError> {
+    let mut random = Pcg64::seed_from_u64(spec.seed);
+    let level = NOISE[random.random_range(0..NOISE.len())];
+    let mut last = String::new();
+    for number in 0..ATTEMPTS {
+        let clip = MILDER.powi(number as i32);
+        match attempt(robot, spec, level, clip, &mut random) {
+            Ok(Some(case)) => return Ok(case),
+            Ok(None) => last = format!("more than {ASTRAY} rad off, or a saturation that does not bite"),
+            Err(error) => last = error.to_string(),
+        }
+    }
+    let kinds: Vec<&str> = spec.sorts.iter().map(|sort| sort.name()).collect();
+    Err(CaseError::NoDraw { robot: robot.name.clone(), kinds: kinds.join(", "), last })
+}
+
+/// One draw; `None` where the robot did not follow or a saturation did not clip. `clip` makes saturations milder.
+fn attempt(
+    robot: &Robot,
+    spec: &CaseSpec,
+    (position_noise, effort_noise): (f64, f64),
+    clip: f64,
+    random: &mut Pcg64,
+) -> Result<Option<Case>, GenerateError> {
+    let count = spec.episodes + spec.tests;
+    let mut drawn: Vec<Drawn> =
+        spec.sorts.iter().map(|sort| draw(*sort, robot, spec.difficulty, count, spec.seconds, random)).collect();
+    let sensors = Sensors { position_noise, effort_noise, ..Sensors::IDEAL };
+    let motor_encoders = drawn.iter().any(|drawn| drawn.motor_encoder);
+    let recipe = Recipe { seconds: spec.seconds, motor_encoders, sensors, ..Recipe::default() };
+    let quiet = Recipe { sensors: Sensors::IDEAL, ..recipe };
+    let seeds: Vec<u64> = (0..=count).map(|_| random.random()).collect();
+
+    let saturated = drawn.iter().position(|d| d.sealed.kind == Kind::TorqueSaturation.name());
+    let mut limit = None;
+    if let Some(which) = saturated {
+        let log = simulate(robot, &drawn, 0, seeds[count], &quiet)?;
+        let joint = strongest(&log, random);
+        let share = 1.0 - drawn[which].sealed.parameters.get("quantile").and_then(Value::as_f64).unwrap_or(0.9);
+        let quantile = 1.0 - clip * share;
+        drawn[which].sealed.parameters.insert("quantile".into(), quantile.into());
+        let mut sizes: Vec<f64> = log.effort[joint].iter().map(|effort| effort.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let at = sizes[(quantile * (sizes.len() - 1) as f64).round() as usize];
+        drawn[which].saturate(robot, joint, at);
+        limit = Some((joint, at));
+    }
+
+    let mut logs = Vec::with_capacity(count);
+    for (episode, seed) in seeds[..count].iter().enumerate() {
+        let speed = SPEED.choose(random).copied().unwrap_or(1.0);
+        let log = simulate(robot, &drawn, episode, *seed, &Recipe { speed, ..recipe })?;
+        if strays(&log) {
+            return Ok(None);
+        }
+        logs.push(log);
+    }
+    if limit.is_some_and(|(joint, limit)| clipped(&logs[..spec.episodes], joint, limit) < CLIPPED) {
+        return Ok(None);
+    }
+    see(robot, &mut drawn, seeds[count], &recipe, &quiet)?;
+    let speed_noise = 2f64.sqrt() * position_noise * recipe.rate;
+    let kinds = if spec.sorts.is_empty() {
+        vec!["none".to_owned()]
+    } else {
+        spec.sorts.iter().map(|sort| sort.name().to_owned()).collect()
+    };
+    let truth = Truth {
+        robot: robot.name.clone(),
+        seed: spec.seed,
+        noise: [position_noise, speed_noise, effort_noise],
+        known: spec.sorts.iter().all(|sort| matches!(sort, Sort::Known(_))),
+        kinds,
+        effects: drawn.into_iter().map(|drawn| drawn.sealed).collect(),
+    };
+    let tests = logs.split_off(spec.episodes);
+    Ok(Some(Case { episodes: logs, tests, truth }))
+}
+
+/// A log of the robot with what was drawn.
+fn simulate(
+    robot: &Robot,
+    drawn: &[Drawn],
+    episode: usize,
+    seed: u64,
+    recipe: &Recipe,
+) -> Result<Episode, GenerateError> {
+    let effects: Vec<Effect> = drawn.iter().flat_map(|drawn| drawn.in_episode(episode)).cloned().collect();
+    // A case has one law outside the catalogue at most.
+    let Some(law) = drawn.iter().find_map(|drawn| drawn.outside.as_ref()) else {
+        return generate(&robot.model, &effects, seed, recipe, "episode");
+    };
+    let mut plant = Plant::new(&robot.model, &effects, recipe.step())?;
+    if recipe.motor_encoders {
+        plant = plant.with_motor_encoders();
+    }
+    let mut disturbed = Disturbed::new(plant, law, &robot.model);
+    record(&robot.model, &effects, &mut disturbed, seed, recipe, "episode")
+}
+
+/// Writes into each effect how visible it is, compared with the same robot without it and without noise; a drive that
+/// winds up, with one that has only its rotor. A saturation's torque is in the log, so that its signature says nothing.
+fn see(robot: &Robot, drawn: &mut [Drawn], seed: u64, recipe: &Recipe, quiet: &Recipe) -> Result<(), GenerateError> {
+    if drawn.is_empty() {
+        return Ok(());
+    }
+    let run = |drawn: &[Drawn], recipe: &Recipe| -> Result<Vec<Vec<f64>>, GenerateError> {
+        Ok(residual(&robot.model, &simulate(robot, drawn, 0, seed, recipe)?))
+    };
+    let noise = run(&[], recipe)?;
+    let with = run(drawn, quiet)?;
+    for which in 0..drawn.len() {
+        if drawn[which].sealed.kind == Kind::TorqueSaturation.name() {
+            continue;
+        }
+        let mut rest = drawn.to_vec();
+        rest[which].effects.clear();
+        rest[which].contacts.clear();
+        rest[which].outside = None;
+        // A robot that falls over without its effect says nothing about its size.
+        if let Ok(without) = run(&rest, quiet) {
+            drawn[which].sealed.power = power(&with, &without, &noise);
+        }
+    }
+    Ok(())
+}
+
+/// One of the joints of greatest rms effort.
+fn strongest(log: &Episode, random: &mut Pcg64) -> usize {
+    let square = |j: &usize| log.effort[*j].iter().map(|e| e * e).sum::<f64>();
+    let mut joints: Vec<usize> = (0..log.effort.len()).collect();
+    joints.sort_by(|a, b| square(b).total_cmp(&square(a)));
+    joints.truncate(STRONGEST);
+    joints.choose(random).copied().unwrap_or_default()
+}
+
+fn strays(log: &Episode) -> bool {
+    let command = log.command.iter().flatten();
+    command.zip(&log.position).any(|(command, q)| command.iter().zip(q).any(|(c, q)| (c - q).abs() > ASTRAY))
+}
+
+/// Share of the samples whose effort is beyond a limit.
+fn clipped(logs: &[Episode], joint: usize, limit: f64) -> f64 {
+    let efforts = || logs.iter().flat_map(|log| &log.effort[joint]);
+    efforts().filter(|effort| effort.abs() > limit).count() as f64 / efforts().count().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outside::Outside;
+    use crate::truth::DETECTABLE;
+    use gapscope_dynamics::{Model, robots};
+    use std::f64::consts::TAU;
+
+    fn robot(name: &str) -> Robot {
+        let urdf = robots::urdf(name).unwrap();
+        Robot::new(name.into(), urdf.into(), Model::from_urdf(urdf).unwrap().model).unwrap()
+    }
+
+    fn spec(sorts: Vec<Sort>, seed: u64) -> CaseSpec {
+        CaseSpec { sorts, seed, difficulty: Difficulty::Mixed, seconds: 3.0, episodes: 1, tests: 1 }
+    }
+
+    #[test]
+    fn a_hum_is_in_the_log_as_the_law_says() {
+        let robot = robot("double_pendulum");
+        let mut hum = draw(Sort::Unknown(2), &robot, Difficulty::Easy, 1, 3.0, &mut Pcg64::seed_from_u64(1));
+        let law = Outside::Hum { joint: 1, amplitude: 0.2, frequency: 1.0, phase: 0.3 };
+        hum.outside = Some(law);
+        let recipe = Recipe { seconds: 3.0, sensors: Sensors::IDEAL, ..Recipe::default() };
+        let rest = residual(&robot.model, &simulate(&robot, &[hum], 0, 4, &recipe).unwrap());
+        let bare = residual(&robot.model, &simulate(&robot, &[], 0, 4, &recipe).unwrap());
+        for k in 100..1300 {
+            // Effort makes up for what the law does; row k is sample k + 1.
+            let law = -0.2 * (TAU * (k + 1) as f64 / 500.0 + 0.3).sin();
+            assert!((rest[1][k] - bare[1][k] - law).abs() < 0.01, "{k}: {} {law}", rest[1][k] - bare[1][k]);
+            assert!((rest[0][k] - bare[0][k]).abs() < 0.01);
+        }
+    }
+
+    #[test]
+    fn what_drags_takes_energy_and_what_sloshes_gives_it_back() {
+        let robot = robot("double_pendulum");
+        let recipe = Recipe { seconds: 4.0, sensors: Sensors::IDEAL, ..Recipe::default() };
+        let work = |which: usize| {
+            let law = draw(Sort::Unknown(which), &robot, Difficulty::Easy, 1, 4.0, &mut Pcg64::seed_from_u64(2));
+            let log = simulate(&robot, &[law], 0, 4, &recipe).unwrap();
+            let rest = residual(&robot.model, &log);
+            let (mut lost, mut moved) = (0.0, 0.0);
+            for (q, rest) in log.position.iter().zip(&rest) {
+                for k in 50..rest.len() - 50 {
+                    let power = rest[k] * (q[k + 2] - q[k]);
+                    (lost, moved) = (lost + power, moved + power.abs());
+                }
+            }
+            lost / moved
+        };
+        for (which, law) in crate::UNKNOWN.iter().enumerate() {
+            let share = work(which);
+            match *law {
+                "unknown_tip_drag" => assert!(share > 0.8, "{law}: {share}"),
+                // It rubs for a short while; the smoothing blurs the rest.
+                "unknown_rub_spot" => assert!(share > 0.2, "{law}: {share}"),
+                "unknown_slosh" => assert!(share.abs() < 0.6, "{law}: {share}"),
+                _ => {}
+            }
+        }
+    }
+
+    #[test]
+    fn every_kind_and_every_law_makes_a_case_that_shows_it() {
+        let robot = robot("arm6");
+        let known = Kind::ALL.into_iter().map(Sort::Known);
+        for (seed, sort) in known.chain((0..crate::UNKNOWN.len()).map(Sort::Unknown)).enumerate() {
+            let case = make_case(&robot, &spec(vec![sort], seed as u64)).unwrap_or_else(|e| panic!("{e}"));
+            let [effect] = case.truth.effects.as_slice() else { panic!("{:?}", case.truth) };
+            assert_eq!(effect.kind, sort.name());
+            assert_eq!((case.episodes.len(), case.tests.len()), (1, 1));
+            assert!(effect.joints.iter().map(|&j| robot.joint(j)).eq(effect.joint_names.iter().cloned()));
+            match effect.visibility() {
+                Some(power) => assert!(power > DETECTABLE, "{}: {power}", effect.kind),
+                None => assert_eq!(sort, Sort::Known(Kind::TorqueSaturation)),
+            }
+        }
+    }
+
+    #[test]
+    fn a_case_without_an_effect_has_no_truth_but_its_noise() {
+        let case = make_case(&robot("double_pendulum"), &spec(vec![], 3)).unwrap();
+        assert_eq!((case.truth.kinds.as_slice(), case.truth.effects.len()), (["none".to_owned()].as_slice(), 0));
+        assert!(case.truth.known && case.truth.noise.iter().all(|noise| *noise > 0.0));
+    }
+}

@@ -1,0 +1,27 @@
+//! Withheld cases: robots whose hidden effect only a sealed file knows, and how well a diagnosis names it.
+//!
+//! A bank is a folder of cases, `case_*/{robot.urdf, episode_*.csv}`, with a sealed folder beside it,
+//! `case_*/{truth.json, test_*.csv}`. [`judge`] holds one answer against one [`Truth`]; [`Score`] counts a bank.
+//! [`Plan`] says what a bank holds, [`make_case`] makes one case.
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod answer;
+mod case;
+mod draw;
+mod judge;
+mod outside;
+mod plan;
+mod robot;
+mod score;
+mod truth;
+mod visibility;
+
+pub use answer::{Answer, Named};
+pub use case::{Case, CaseError, CaseSpec, make_case};
+pub use draw::{Difficulty, Sort, UNKNOWN};
+pub use judge::{Judgement, ParameterError, judge};
+pub use outside::Outside;
+pub use plan::Plan;
+pub use robot::Robot;
+pub use score::{CalibrationBin, CaseScore, GroupTotals, SCORE_SCHEMA, Score, Totals};
+pub use truth::{DETECTABLE, Group, SealedEffect, Truth, is_unknown};

@@ -1,0 +1,110 @@
+//! What a withheld case keeps sealed.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// Signature over noise below which nobody can tell an effect at a joint.
+pub const DETECTABLE: f64 = 5.0;
+
+/// The sealed truth of one case, `truth.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Truth {
+    /// Name of the robot.
+    pub robot: String,
+    /// Seed that the case was drawn by.
+    pub seed: u64,
+    /// Standard deviations: encoder (rad), measured speed (rad/s), logged effort (part of a joint's friction scale).
+    pub noise: [f64; 3],
+    /// Kinds of effect, `none` for a case without any; those outside the catalogue begin with `unknown_`.
+    pub kinds: Vec<String>,
+    /// The effects with their parameters.
+    pub effects: Vec<SealedEffect>,
+    /// Whether the catalogue has all kinds.
+    pub known: bool,
+}
+
+/// One sealed effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SealedEffect {
+    /// Public name, or one that begins with `unknown_`.
+    pub kind: String,
+    /// Indices of the joints affected.
+    pub joints: Vec<usize>,
+    /// Their names.
+    pub joint_names: Vec<String>,
+    /// Per joint of the robot, the effect's signature over the log's noise; empty where it cannot be given.
+    #[serde(default)]
+    pub power: Vec<f64>,
+    /// Parameters under the truth's short names, one number or one per affected joint.
+    #[serde(flatten)]
+    pub parameters: Map<String, Value>,
+}
+
+/// What a case asks of a diagnosis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Group {
+    /// One effect of the catalogue.
+    Single,
+    /// Several effects of the catalogue.
+    Multi,
+    /// Effects of the catalogue beside one outside it.
+    Mixed,
+    /// No effect at all.
+    None,
+    /// Only effects outside the catalogue.
+    Unknown,
+    /// An effect that is under the noise at every joint: counted apart.
+    Undetectable,
+}
+
+impl Group {
+    /// Every group, in the order of reports.
+    pub const ALL: [Group; 6] =
+        [Group::Single, Group::Multi, Group::Mixed, Group::None, Group::Unknown, Group::Undetectable];
+
+    /// The name in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Group::Single => "single",
+            Group::Multi => "multi",
+            Group::Mixed => "mixed",
+            Group::None => "none",
+            Group::Unknown => "unknown",
+            Group::Undetectable => "undetectable",
+        }
+    }
+}
+
+/// Whether an effect of this name is outside the catalogue.
+pub fn is_unknown(kind: &str) -> bool {
+    kind.starts_with("unknown")
+}
+
+impl SealedEffect {
+    /// The signature over noise at the joint that shows it best; `None` where it cannot be given.
+    pub fn visibility(&self) -> Option<f64> {
+        self.power.iter().copied().reduce(f64::max)
+    }
+}
+
+impl Truth {
+    /// The group the case is counted in.
+    pub fn group(&self) -> Group {
+        let kinds: Vec<&String> = self.kinds.iter().filter(|kind| *kind != "none").collect();
+        let unknown = kinds.iter().filter(|kind| is_unknown(kind)).count();
+        if kinds.is_empty() {
+            Group::None
+        } else if self.effects.iter().filter_map(SealedEffect::visibility).any(|power| power < DETECTABLE) {
+            Group::Undetectable
+        } else if unknown == kinds.len() {
+            Group::Unknown
+        } else if unknown > 0 {
+            Group::Mixed
+        } else if kinds.len() > 1 {
+            Group::Multi
+        } else {
+            Group::Single
+        }
+    }
+}

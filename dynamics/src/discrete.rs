@@ -39,12 +39,14 @@ pub struct Discrete {
     lanes: LaneData,
     one: Buffers<f64>,
     eight: Buffers<[f64; LANES]>,
+    torque: Vec<[f64; LANES]>,
     tangent: Tangent,
 }
 
-/// Where a stage is, its slope, and the weighted sum of slopes; 2n each.
+/// Where a step starts, where a stage is, its slope, and the weighted sum of slopes; 2n each.
 #[derive(Debug, Clone)]
 struct Buffers<T> {
+    start: Vec<T>,
     stage: Vec<T>,
     slope: Vec<T>,
     sum: Vec<T>,
@@ -52,7 +54,7 @@ struct Buffers<T> {
 
 impl<T: Copy> Buffers<T> {
     fn new(n: usize, zero: T) -> Self {
-        Self { stage: vec![zero; 2 * n], slope: vec![zero; 2 * n], sum: vec![zero; 2 * n] }
+        Self { start: vec![zero; 2 * n], stage: vec![zero; 2 * n], slope: vec![zero; 2 * n], sum: vec![zero; 2 * n] }
     }
 }
 
@@ -76,7 +78,7 @@ impl Discrete {
         let [by_position, by_velocity, by_torque] = std::array::from_fn(|_| DMatrix::zeros(n, n));
         let tangent = Tangent { stage, slope, sum, by_position, by_velocity, by_torque };
         let (one, eight) = (Buffers::new(n, 0.0), Buffers::new(n, [0.0; LANES]));
-        Self { model, dt, integrator, data, lanes, one, eight, tangent }
+        Self { model, dt, integrator, data, lanes, one, eight, torque: vec![[0.0; LANES]; n], tangent }
     }
 
     /// The model that it steps.
@@ -87,6 +89,34 @@ impl Discrete {
     /// The scheme.
     pub fn integrator(&self) -> Integrator {
         self.integrator
+    }
+
+    /// Moves the lanes of `eight.start` on under `torque`.
+    fn step_lanes(&mut self) {
+        let (n, dt) = (self.model.dof(), self.dt);
+        let Buffers { start, stage, slope, sum } = &mut self.eight;
+        stage.copy_from_slice(start);
+        sum.fill([0.0; LANES]);
+        for &(weight, reach) in self.integrator.scheme() {
+            let (q, v) = stage.split_at(n);
+            let (rate, acceleration) = slope.split_at_mut(n);
+            rate.copy_from_slice(v);
+            self.model.forward_dynamics_lanes(&mut self.lanes, q, v, &self.torque, acceleration);
+            for i in 0..2 * n {
+                for k in 0..LANES {
+                    sum[i][k] += weight * slope[i][k];
+                    stage[i][k] = start[i][k] + reach * dt * slope[i][k];
+                }
+            }
+        }
+        if self.integrator == Integrator::SemiImplicitEuler {
+            for i in 0..n {
+                (0..LANES).for_each(|k| sum[i][k] += dt * sum[n + i][k]);
+            }
+        }
+        for (start, sum) in start.iter_mut().zip(sum) {
+            (0..LANES).for_each(|k| start[k] += dt * sum[k]);
+        }
     }
 }
 
@@ -104,7 +134,7 @@ impl StepModel for Discrete {
     fn step(&mut self, x: &mut [f64], tau: &[f64]) {
         let (n, dt) = (self.model.dof(), self.dt);
         assert_eq!(x.len(), 2 * n, "n positions and n velocities");
-        let Buffers { stage, slope, sum } = &mut self.one;
+        let Buffers { stage, slope, sum, .. } = &mut self.one;
         stage.copy_from_slice(x);
         sum.fill(0.0);
         for &(weight, reach) in self.integrator.scheme() {
@@ -125,32 +155,26 @@ impl StepModel for Discrete {
         x.iter_mut().zip(sum).for_each(|(x, sum)| *x += dt * *sum);
     }
 
+    /// Eight states at a time in vector registers. Does not allocate.
+    ///
     /// # Panics
-    /// If `x` is not of length 2n or `tau` not of length n.
-    fn step_lanes(&mut self, x: &mut [[f64; LANES]], tau: &[[f64; LANES]]) {
-        let (n, dt) = (self.model.dof(), self.dt);
-        assert_eq!(x.len(), 2 * n, "n positions and n velocities");
-        let Buffers { stage, slope, sum } = &mut self.eight;
-        stage.copy_from_slice(x);
-        sum.fill([0.0; LANES]);
-        for &(weight, reach) in self.integrator.scheme() {
-            let (q, v) = stage.split_at(n);
-            let (rate, acceleration) = slope.split_at_mut(n);
-            rate.copy_from_slice(v);
-            self.model.forward_dynamics_lanes(&mut self.lanes, q, v, tau, acceleration);
+    /// If there is not one row of n torques a state of 2n.
+    fn step_batch(&mut self, x: &mut [f64], tau: &[f64]) {
+        let n = self.model.dof();
+        assert!(x.len() == 2 * tau.len() && tau.len().is_multiple_of(n.max(1)), "one row of torques a state");
+        for (x, tau) in x.chunks_mut(LANES * 2 * n).zip(tau.chunks(LANES * n)) {
+            let rows = tau.len() / n;
+            // Lanes without a state repeat the last one.
+            let row = |k: usize| k.min(rows - 1);
             for i in 0..2 * n {
-                for k in 0..LANES {
-                    sum[i][k] += weight * slope[i][k];
-                    stage[i][k] = x[i][k] + reach * dt * slope[i][k];
-                }
+                (0..LANES).for_each(|k| self.eight.start[i][k] = x[row(k) * 2 * n + i]);
             }
-        }
-        for i in 0..2 * n {
-            // The position of the semi-implicit scheme moves with the velocity at the step's end.
-            let late = if i < n && self.integrator == Integrator::SemiImplicitEuler { dt } else { 0.0 };
-            for k in 0..LANES {
-                let slope = if late > 0.0 { sum[i][k] + late * sum[n + i][k] } else { sum[i][k] };
-                x[i][k] += dt * slope;
+            for j in 0..n {
+                (0..LANES).for_each(|k| self.torque[j][k] = tau[row(k) * n + j]);
+            }
+            self.step_lanes();
+            for k in 0..rows {
+                (0..2 * n).for_each(|i| x[k * 2 * n + i] = self.eight.start[i][k]);
             }
         }
     }

@@ -1,6 +1,5 @@
 //! Models that step: the one trait at the crate's edge.
 
-use crate::real::LANES;
 use nalgebra::DMatrix;
 
 /// A discrete-time model x ↦ F(x, τ). Object-safe.
@@ -36,18 +35,15 @@ pub trait StepModel {
     /// May panic if a slice has another length.
     fn step(&mut self, x: &mut [f64], tau: &[f64]);
 
-    /// [`LANES`] steps at once, in place: `x[i][k]` is entry i of the state of lane k, `tau[j][k]` its torque on joint j.
-    /// One lane after the other unless a model knows better; then lanes may differ from single steps by rounding.
+    /// One step of many states, in place: `x` holds them one after the other (rows of `state_len`), `tau` the torques of
+    /// each (rows of n). Row by row unless a model knows better; then results may differ from single steps by rounding.
     ///
     /// # Panics
-    /// May panic if a slice has another length.
-    fn step_lanes(&mut self, x: &mut [[f64; LANES]], tau: &[[f64; LANES]]) {
-        let (mut one, mut torque) = (vec![0.0; x.len()], vec![0.0; tau.len()]);
-        for k in 0..LANES {
-            one.iter_mut().zip(&*x).for_each(|(one, row)| *one = row[k]);
-            torque.iter_mut().zip(tau).for_each(|(one, row)| *one = row[k]);
-            self.step(&mut one, &torque);
-            x.iter_mut().zip(&one).for_each(|(row, one)| row[k] = *one);
+    /// May panic if there is not one row of torques a state.
+    fn step_batch(&mut self, x: &mut [f64], tau: &[f64]) {
+        let (len, n) = (self.state_len(), self.joints());
+        for (x, tau) in x.chunks_exact_mut(len).zip(tau.chunks_exact(n)) {
+            self.step(x, tau);
         }
     }
 
@@ -58,6 +54,30 @@ pub trait StepModel {
     /// May panic if a slice or a matrix has another shape.
     fn jacobian(&mut self, x: &[f64], tau: &[f64], by_state: &mut DMatrix<f64>, by_torque: &mut DMatrix<f64>) {
         central_differences(self, x, tau, by_state, by_torque);
+    }
+}
+
+impl<M: StepModel + ?Sized> StepModel for Box<M> {
+    fn joints(&self) -> usize {
+        (**self).joints()
+    }
+    fn dt(&self) -> f64 {
+        (**self).dt()
+    }
+    fn state_len(&self) -> usize {
+        (**self).state_len()
+    }
+    fn start(&self, q: &[f64], v: &[f64], x: &mut [f64]) {
+        (**self).start(q, v, x);
+    }
+    fn step(&mut self, x: &mut [f64], tau: &[f64]) {
+        (**self).step(x, tau);
+    }
+    fn step_batch(&mut self, x: &mut [f64], tau: &[f64]) {
+        (**self).step_batch(x, tau);
+    }
+    fn jacobian(&mut self, x: &[f64], tau: &[f64], by_state: &mut DMatrix<f64>, by_torque: &mut DMatrix<f64>) {
+        (**self).jacobian(x, tau, by_state, by_torque);
     }
 }
 

@@ -99,13 +99,13 @@ fn steps_allocate_nothing() {
     for integrator in [Integrator::ExplicitEuler, Integrator::SemiImplicitEuler, Integrator::Rk4] {
         let mut steps = Discrete::new(model.clone(), 1e-3, integrator);
         let mut x = vec![0.0; steps.state_len()];
-        let mut lanes = vec![[0.1; LANES]; 2 * n];
-        let torques = vec![[0.1; LANES]; n];
+        let mut batch = vec![0.1; 11 * 2 * n];
+        let torques = vec![0.1; 11 * n];
         let (mut by_state, mut by_torque) = (DMatrix::zeros(2 * n, 2 * n), DMatrix::zeros(2 * n, n));
         assert_allocates_nothing(|| {
             steps.start(&q, &v, &mut x);
             steps.step(&mut x, &tau);
-            steps.step_lanes(&mut lanes, &torques);
+            steps.step_batch(&mut batch, &torques);
             steps.jacobian(&x, &tau, &mut by_state, &mut by_torque);
         });
     }

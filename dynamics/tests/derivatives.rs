@@ -95,21 +95,19 @@ fn steps_agree_with_differences() {
 }
 
 #[test]
-fn lanes_step_as_single_states_do() {
+fn a_batch_steps_as_single_states_do() {
     let mut draw = Draw::new(9);
     let model = draw.tree(4);
     let n = model.dof();
     for integrator in [Integrator::ExplicitEuler, Integrator::SemiImplicitEuler, Integrator::Rk4] {
         let mut step = Discrete::new(model.clone(), 0.01, integrator);
-        let mut lanes: Vec<[f64; 8]> = (0..2 * n).map(|_| draw.numbers(8, 1.0).try_into().unwrap()).collect();
-        let tau: Vec<[f64; 8]> = (0..n).map(|_| draw.numbers(8, 1.0).try_into().unwrap()).collect();
-        let before = lanes.clone();
-        step.step_lanes(&mut lanes, &tau);
-        for k in 0..8 {
-            let lane = |rows: &[[f64; 8]]| -> Vec<f64> { rows.iter().map(|r| r[k]).collect() };
-            let mut x = lane(&before);
-            step.step(&mut x, &lane(&tau));
-            assert_close(&x, &lane(&lanes), 1e-11);
+        let (before, tau) = (draw.numbers(13 * 2 * n, 1.0), draw.numbers(13 * n, 1.0));
+        let mut batch = before.clone();
+        step.step_batch(&mut batch, &tau);
+        for k in 0..13 {
+            let mut x = before[2 * n * k..2 * n * (k + 1)].to_vec();
+            step.step(&mut x, &tau[n * k..n * (k + 1)]);
+            assert_close(&x, &batch[2 * n * k..2 * n * (k + 1)], 1e-11);
         }
     }
 }

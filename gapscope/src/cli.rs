@@ -19,6 +19,11 @@ pub enum Command {
     Diagnose(Diagnose),
     /// Measure the gap on other logs, before and after the corrections that a diagnosis found
     Evaluate(Evaluate),
+    /// Show how the model's error grows over the horizon, beside what one-step errors and Jacobians allow
+    Rollout(Rollout),
+    /// Run a study of this project's own, as its documents show it
+    #[command(subcommand)]
+    Study(Study),
     /// Diagnose a withheld effect on the built-in 7-joint arm, then reveal it
     Demo(Demo),
 }
@@ -80,6 +85,56 @@ pub struct Evaluate {
     /// Replace the predictions file if it exists
     #[arg(long)]
     pub force: bool,
+}
+
+/// Arguments of `rollout`.
+#[derive(Debug, Args)]
+pub struct Rollout {
+    /// Robot and logs
+    #[command(flatten)]
+    pub input: Input,
+    /// Corrected model that `diagnose` wrote
+    #[arg(long, value_name = "FILE")]
+    pub with: Option<PathBuf>,
+    /// Longest horizon, s
+    #[arg(long, default_value_t = 1.0)]
+    pub horizon: f64,
+    /// Position error over all joints at which a rollout has left the log, rad or m
+    #[arg(long, default_value_t = 0.05)]
+    pub tolerance: f64,
+    /// Fit each rollout's initial state to this many seconds of the log: for noisy logs
+    #[arg(long, value_name = "SECONDS")]
+    pub fit_start: Option<f64>,
+    /// Rollouts over all logs
+    #[arg(long, default_value_t = 240)]
+    pub starts: usize,
+    /// Page to write [default: rollout.html in a new folder beside the first log]
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Replace the page if it exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Studies.
+#[derive(Debug, Subcommand)]
+pub enum Study {
+    /// Plan in the model, deploy on a robot with a hidden effect: what was promised and what is paid
+    ClosedLoop(ClosedLoop),
+}
+
+/// Arguments of `study closed-loop`.
+#[derive(Debug, Args)]
+pub struct ClosedLoop {
+    /// Folder for closed-loop.md and closed-loop.svg [default: a new folder in the current one]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace them if they exist
+    #[arg(long)]
+    pub force: bool,
+    /// Samples of the sampling planner at each command
+    #[arg(long, default_value_t = 256)]
+    pub samples: usize,
 }
 
 /// Arguments of `demo`.

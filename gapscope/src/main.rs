@@ -8,6 +8,8 @@ mod evaluate;
 mod input;
 mod output;
 mod report;
+mod rollout;
+mod study;
 mod summary;
 
 use clap::Parser;
@@ -19,6 +21,8 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Rollout(args) => rollout::run(&args),
+        Command::Study(study) => study::run(study),
         Command::Demo(args) => demo::run(&args),
     };
     match result {

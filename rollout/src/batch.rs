@@ -1,7 +1,10 @@
-//! Many rollouts at once, in lanes of eight states, on all cores.
+//! Many rollouts at once, in blocks, on all cores.
 
-use gapscope_dynamics::{LANES, StepModel};
+use gapscope_dynamics::StepModel;
 use rayon::prelude::*;
+
+/// States that a worker steps together: enough to fill vector registers and to read a network's weights once for many.
+pub const BLOCK: usize = 64;
 
 /// Models for as many workers as there are cores, kept from call to call.
 #[derive(Debug)]
@@ -12,8 +15,8 @@ pub struct Batch<M> {
 #[derive(Debug)]
 struct Worker<M> {
     model: M,
-    x: Vec<[f64; LANES]>,
-    tau: Vec<[f64; LANES]>,
+    x: Vec<f64>,
+    tau: Vec<f64>,
 }
 
 impl<M: StepModel + Send> Batch<M> {
@@ -21,7 +24,7 @@ impl<M: StepModel + Send> Batch<M> {
     pub fn new(model: impl Fn() -> M) -> Batch<M> {
         let worker = |_| {
             let model = model();
-            let (x, tau) = (vec![[0.0; LANES]; model.state_len()], vec![[0.0; LANES]; model.joints()]);
+            let (x, tau) = (vec![0.0; BLOCK * model.state_len()], vec![0.0; BLOCK * model.joints()]);
             Worker { model, x, tau }
         };
         Batch { workers: (0..rayon::current_num_threads().max(1)).map(worker).collect() }
@@ -34,12 +37,13 @@ impl<M: StepModel + Send> Batch<M> {
         }
     }
 
-    /// Runs `block(model, x, tau, item)` for each item of `blocks`, each on some worker: `x` and `tau` are the lanes'
-    /// scratch, to be filled first. As no item sees another, the result is the same whatever the number of cores.
+    /// Runs `block(model, x, tau, item)` for each item of `blocks`, each on some worker: `x` and `tau` are scratch for
+    /// [`BLOCK`] states and their torques, to be filled first. As no item sees another, the result is the same whatever
+    /// the number of cores.
     pub fn for_each<T: Send>(
         &mut self,
         blocks: &mut [T],
-        block: impl Fn(&mut M, &mut [[f64; LANES]], &mut [[f64; LANES]], &mut T) + Sync,
+        block: impl Fn(&mut M, &mut [f64], &mut [f64], &mut T) + Sync,
     ) {
         let each = blocks.len().div_ceil(self.workers.len()).max(1);
         self.workers.par_iter_mut().zip(blocks.par_chunks_mut(each)).for_each(|(worker, mine)| {
@@ -49,31 +53,19 @@ impl<M: StepModel + Send> Batch<M> {
         });
     }
 
-    /// End states of rollouts from `starts` (each of `state_len`) under `efforts[step]` (n), the same for all; in place.
+    /// Steps `states`, one after the other in rows of `state_len`, under `efforts[step]` (n), the same for all; in place.
     ///
     /// # Panics
     /// If a slice has another length.
-    pub fn rollout(&mut self, starts: &mut [Vec<f64>], efforts: &[Vec<f64>]) {
-        let mut blocks: Vec<&mut [Vec<f64>]> = starts.chunks_mut(LANES).collect();
-        self.for_each(&mut blocks, |model, x, tau, states| {
-            // Lanes beyond the last state repeat it.
-            for (i, row) in x.iter_mut().enumerate() {
-                *row = lanes(|k| states[k.min(states.len() - 1)][i]);
-            }
+    pub fn rollout(&mut self, states: &mut [f64], efforts: &[Vec<f64>]) {
+        let Some(len) = self.workers.first().map(|w| w.model.state_len()) else { return };
+        let mut blocks: Vec<&mut [f64]> = states.chunks_mut(BLOCK * len).collect();
+        self.for_each(&mut blocks, |model, _, tau, states| {
+            let tau = &mut tau[..states.len() / len * model.joints()];
             for effort in efforts {
-                tau.iter_mut().zip(effort).for_each(|(row, effort)| *row = [*effort; LANES]);
-                model.step_lanes(x, tau);
-            }
-            for (k, state) in states.iter_mut().enumerate() {
-                state.iter_mut().zip(&*x).for_each(|(entry, row)| *entry = row[k]);
+                tau.chunks_exact_mut(effort.len()).for_each(|row| row.copy_from_slice(effort));
+                model.step_batch(states, tau);
             }
         });
     }
-}
-
-/// One number a lane.
-pub fn lanes(mut value: impl FnMut(usize) -> f64) -> [f64; LANES] {
-    let mut out = [0.0; LANES];
-    out.iter_mut().enumerate().for_each(|(k, out)| *out = value(k));
-    out
 }

@@ -16,7 +16,7 @@ mod initial_state;
 mod lipschitz;
 mod norm;
 
-pub use batch::{Batch, lanes};
+pub use batch::{BLOCK, Batch};
 pub use bound::{Bounds, bounds, geometric};
 pub use growth::{Growth, Quantiles, growth_rate};
 pub use horizon::{Errors, Initial, Start, Trajectory, horizon_errors, horizon_states};

@@ -10,6 +10,7 @@ mod format;
 mod heatmap;
 mod joints;
 mod rest;
+mod rollout;
 mod series;
 mod shrink;
 pub mod terminal;
@@ -24,10 +25,12 @@ use gapscope_diagnosis::schema::{Diagnosis, Evidence, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 pub use answer::{changed, headline, is_above_floor, largest};
+pub use axis::Axis;
 pub use format::{
     NONE, count, estimate, figure, percent, percent_figure, percent_interval, plain, probability_figure, significant,
     span, with_unit,
 };
+pub use rollout::page as rollout_page;
 pub use words::{
     capital, effect, implied_unit, interval, joints as joint_list, motion_unit, outstanding, regime, said_of, verdict,
 };

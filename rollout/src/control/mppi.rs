@@ -1,8 +1,8 @@
 //! Model predictive path integral control: a planner that samples.
 
 use super::{Controller, Task};
-use crate::batch::{Batch, lanes};
-use gapscope_dynamics::{LANES, StepModel};
+use crate::batch::{BLOCK, Batch};
+use gapscope_dynamics::StepModel;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 /// How the planner samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MppiSettings {
-    /// Samples a command, rounded up to whole blocks of eight.
+    /// Samples a command, rounded up to whole blocks of 64.
     pub samples: usize,
     /// Steps that it looks ahead.
     pub horizon: usize,
@@ -40,11 +40,11 @@ pub struct Mppi<M> {
     start: Vec<f64>,
 }
 
-/// Eight samples.
+/// Some of the samples.
 struct Block {
-    /// Noise on joint j at step t in entry t n + j.
-    noise: Vec<[f64; LANES]>,
-    cost: [f64; LANES],
+    /// Noise of sample k on joint j at step t in entry (t · BLOCK + k) n + j.
+    noise: Vec<f64>,
+    cost: [f64; BLOCK],
     index: u64,
 }
 
@@ -52,8 +52,8 @@ impl<M: StepModel + Send> Mppi<M> {
     /// `model` makes one model a core; each steps by the task's dt.
     pub fn new(model: impl Fn() -> M, task: &Task, settings: MppiSettings) -> Self {
         let n = task.joints();
-        let block = |index| Block { noise: vec![[0.0; LANES]; settings.horizon * n], cost: [0.0; LANES], index };
-        let blocks = (0..settings.samples.div_ceil(LANES) as u64).map(block).collect();
+        let block = |index| Block { noise: vec![0.0; settings.horizon * BLOCK * n], cost: [0.0; BLOCK], index };
+        let blocks = (0..settings.samples.div_ceil(BLOCK) as u64).map(block).collect();
         let plan = vec![vec![0.0; n]; settings.horizon];
         let start = vec![0.0; model().state_len()];
         Self { batch: Batch::new(model), task: task.clone(), settings, blocks, plan, planned_for: 0, start }
@@ -71,27 +71,28 @@ impl<M: StepModel + Send> Mppi<M> {
         self.planned_for = step;
         self.batch.start(&x[..n], &x[n..], &mut self.start);
         let (task, settings, plan, start) = (&self.task, &self.settings, &self.plan, &self.start);
+        let len = start.len();
         self.batch.for_each(&mut self.blocks, |model, state, tau, block| {
             block.draw(settings, step, n);
-            block.cost = [0.0; LANES];
-            state.iter_mut().zip(start).for_each(|(row, value)| *row = [*value; LANES]);
-            for (t, plan) in plan.iter().enumerate() {
+            block.cost = [0.0; BLOCK];
+            state.chunks_exact_mut(len).for_each(|row| row.copy_from_slice(start));
+            for (t, (plan, noise)) in plan.iter().zip(block.noise.chunks_exact_mut(BLOCK * n)).enumerate() {
                 let (free, reference) = (task.effort_at(step + t), task.reference_at(step + t + 1));
-                for j in 0..n {
-                    let (noise, limit) = (&mut block.noise[t * n + j], task.limit[j]);
-                    tau[j] = lanes(|k| (free[j] + plan[j] + noise[k]).clamp(-limit, limit));
-                    for k in 0..LANES {
-                        let off = tau[j][k] - free[j];
-                        noise[k] = off - plan[j];
-                        block.cost[k] += task.dt * task.weights[2] * off * off;
+                let rows = tau.chunks_exact_mut(n).zip(noise.chunks_exact_mut(n));
+                for ((tau, noise), cost) in rows.zip(&mut block.cost) {
+                    for j in 0..n {
+                        tau[j] = (free[j] + plan[j] + noise[j]).clamp(-task.limit[j], task.limit[j]);
+                        let off = tau[j] - free[j];
+                        // What the limit takes away is no part of the sample.
+                        noise[j] = off - plan[j];
+                        *cost += task.dt * task.weights[2] * off * off;
                     }
                 }
-                model.step_lanes(state, tau);
-                for i in 0..2 * n {
-                    let weight = task.dt * task.weights[usize::from(i >= n)];
-                    for k in 0..LANES {
-                        let off = state[i][k] - reference[i];
-                        block.cost[k] += weight * off * off;
+                model.step_batch(state, tau);
+                for (state, cost) in state.chunks_exact(len).zip(&mut block.cost) {
+                    for (i, reference) in reference.iter().enumerate() {
+                        let off = state[i] - reference;
+                        *cost += task.dt * task.weights[usize::from(i >= n)] * off * off;
                     }
                 }
             }
@@ -112,10 +113,9 @@ impl<M: StepModel + Send> Mppi<M> {
         }
         for block in &self.blocks {
             let weights = block.cost.map(|cost| weight(cost) / total);
-            for (t, plan) in self.plan.iter_mut().enumerate() {
-                for (j, plan) in plan.iter_mut().enumerate() {
-                    let noise = &block.noise[t * n + j];
-                    *plan += weights.iter().zip(noise).filter(|(w, _)| **w > 0.0).map(|(w, e)| w * e).sum::<f64>();
+            for (plan, noise) in self.plan.iter_mut().zip(block.noise.chunks_exact(BLOCK * n)) {
+                for (noise, weight) in noise.chunks_exact(n).zip(&weights).filter(|(_, weight)| **weight > 0.0) {
+                    plan.iter_mut().zip(noise).for_each(|(plan, noise)| *plan += weight * noise);
                 }
             }
         }
@@ -129,15 +129,13 @@ impl Block {
         let mut random = Pcg64::seed_from_u64(seed);
         let keep = settings.correlation;
         let fresh = (1.0 - keep * keep).sqrt();
+        let row = BLOCK * n;
         for i in 0..self.noise.len() {
-            let before = if i >= n { self.noise[i - n] } else { [0.0; LANES] };
-            let (keep, fresh) = if i >= n { (keep, fresh) } else { (0.0, 1.0) };
-            let deviation = settings.deviation[i % n];
-            self.noise[i] =
-                lanes(|k| keep * before[k] + fresh * deviation * random.sample::<f64, _>(StandardNormal));
+            let (before, fresh) = if i >= row { (keep * self.noise[i - row], fresh) } else { (0.0, 1.0) };
+            self.noise[i] = before + fresh * settings.deviation[i % n] * random.sample::<f64, _>(StandardNormal);
         }
         if self.index == 0 {
-            self.noise.iter_mut().for_each(|row| row[0] = 0.0);
+            self.noise.chunks_exact_mut(row).for_each(|step| step[..n].fill(0.0));
         }
     }
 }

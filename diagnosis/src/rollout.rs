@@ -5,12 +5,13 @@ use crate::diagnose::signals;
 use crate::horizon::can_step;
 use crate::signals::Signals;
 use gapscope_datasets::Episode;
-use gapscope_dynamics::Model;
+use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{EffectError, Plant};
 use gapscope_rollout::{
     Bounds, Growth, Initial, Norm, Quantiles, Region, Start, Trajectory, bounds, fit_initial_state, geometric,
     horizon_states, lipschitz_constant,
 };
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Most horizons, and the shortest, s.
@@ -19,7 +20,7 @@ const SHORTEST: f64 = 0.004;
 /// Stretches of the logs that bounds are made for, and points of the region that L is sampled at.
 const STRETCHES: usize = 12;
 const POINTS: usize = 512;
-/// Times T of the norm ‖(q, v)‖² = |q|² + |T v|² that are tried, s.
+/// Times T of the norm that are tried, s.
 const TIMES: [f64; 7] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
 
 /// What is asked of [`rollouts`].
@@ -50,7 +51,9 @@ pub struct ModelRollouts {
     pub bound: Option<BoundGrowth>,
 }
 
-/// Error and bounds over the horizon in the norm ‖(q, v)‖² = |q|² + |T v|²: medians over stretches of the logs.
+/// Error and bounds over the horizon, medians over stretches of the logs. The norm is ‖(q, v)‖² = (qᵀ M q + T² vᵀ M v)/m
+/// with M the nominal mass matrix at the mean position of the logs and m its mean diagonal entry: weighted like energy, so
+/// that joints that push each other about count by what moves, and in rad or m.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoundGrowth {
     /// T, s.
@@ -122,10 +125,10 @@ pub fn rollouts(
     if !can_step(&nominal(1e-3), &signals) {
         return Err(RolloutError::Singular);
     }
-    let time = norm_time(&signals, options, &nominal);
+    let norm = choose_norm(model, &signals, options, &nominal);
     let analyse = |plant: &(dyn Fn(f64) -> Plant + Sync)| ModelRollouts {
         growth: growth(&signals, options, plant),
-        bound: bound(&signals, options, plant, time),
+        bound: norm.as_ref().and_then(|(time, norm)| bound(&signals, options, plant, *time, norm)),
     };
     let after = match corrected {
         Some(c) => {
@@ -210,18 +213,37 @@ fn stretches(signals: &[Signals], options: &RolloutOptions) -> Vec<Stretch> {
     signals.iter().filter(|s| s.len() > 1).flat_map(of).collect()
 }
 
-/// The time of the norm in which the loose bound of the nominal model ends nearest to the truth.
-fn norm_time(signals: &[Signals], options: &RolloutOptions, plant: &(dyn Fn(f64) -> Plant + Sync)) -> f64 {
-    let Some(stretch) = stretches(signals, options).into_iter().next() else { return TIMES[3] };
-    let off = |time: &f64| {
-        let norm = Norm::with_time(signals[0].q.len(), *time);
-        let steps = stretch.efforts.len();
-        let found = bounds(&mut plant(stretch.dt), &stretch.states, &stretch.efforts, &[steps], &norm);
-        found.map_or(f64::INFINITY, |found| found.loose[0] / found.truth[0])
+/// The norm with the time T in which the loose bound of the nominal model ends nearest to the truth, and T.
+fn choose_norm(
+    model: &Model,
+    signals: &[Signals],
+    options: &RolloutOptions,
+    plant: &(dyn Fn(f64) -> Plant + Sync),
+) -> Option<(f64, Norm)> {
+    let n = model.dof();
+    let samples: usize = signals.iter().map(Signals::len).sum();
+    let mean = |j: usize| signals.iter().flat_map(|s| &s.q[j]).sum::<f64>() / samples as f64;
+    let mut mass = DMatrix::zeros(n, n);
+    model.mass_matrix(&mut Data::new(model), &(0..n).map(mean).collect::<Vec<_>>(), &mut mass);
+    mass /= mass.trace() / n as f64;
+    let root = mass.cholesky()?.l().transpose();
+    let norm = |time: f64| {
+        let mut scale = DMatrix::zeros(2 * n, 2 * n);
+        scale.view_mut((0, 0), (n, n)).copy_from(&root);
+        scale.view_mut((n, n), (n, n)).copy_from(&(&root * time));
+        Norm::new(scale)
     };
-    let all: Vec<f64> = TIMES.par_iter().map(off).collect();
-    let best = (0..TIMES.len()).min_by(|a, b| all[*a].total_cmp(&all[*b]));
-    best.map_or(TIMES[3], |i| TIMES[i])
+    let stretch = stretches(signals, options).into_iter().next()?;
+    let steps = stretch.efforts.len();
+    let tried = TIMES.par_iter().filter_map(|&time| {
+        let norm = norm(time)?;
+        let found = bounds(&mut plant(stretch.dt), &stretch.states, &stretch.efforts, &[steps], &norm);
+        // A bound beyond the largest number is as bad as any.
+        let off = found.map_or(f64::INFINITY, |found| found.loose[0] / found.truth[0]);
+        Some((off, time, norm))
+    });
+    let tried: Vec<(f64, f64, Norm)> = tried.collect();
+    tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, time, norm)| (time, norm))
 }
 
 fn bound(
@@ -229,21 +251,21 @@ fn bound(
     options: &RolloutOptions,
     plant: &(dyn Fn(f64) -> Plant + Sync),
     time: f64,
+    norm: &Norm,
 ) -> Option<BoundGrowth> {
     let stretches = stretches(signals, options);
     let dt = stretches.first()?.dt;
-    let norm = Norm::with_time(signals.first()?.q.len(), time);
     let times = horizons(options);
     // One L and δ belong to one step: logs at another rate are left out.
     let same: Vec<&Stretch> = stretches.iter().filter(|s| (s.dt - dt).abs() < 1e-9).collect();
     let mut steps: Vec<usize> = times.iter().map(|t| ((t / dt).round() as usize).max(1)).collect();
     steps.dedup();
     let found: Vec<Bounds> =
-        same.par_iter().filter_map(|s| bounds(&mut plant(dt), &s.states, &s.efforts, &steps, &norm)).collect();
+        same.par_iter().filter_map(|s| bounds(&mut plant(dt), &s.states, &s.efforts, &steps, norm)).collect();
     let reached = found.iter().map(|b| b.horizons.len()).min()?;
     let states: Vec<Vec<f64>> = same.iter().flat_map(|s| s.states.iter().cloned()).collect();
     let efforts: Vec<Vec<f64>> = same.iter().flat_map(|s| s.efforts.iter().cloned()).collect();
-    let region = lipschitz_constant(|| plant(dt), &Region::around(&states, &efforts), &norm, POINTS, 1);
+    let region = lipschitz_constant(|| plant(dt), &Region::around(&states, &efforts), norm, POINTS, 1);
     let lipschitz = found.iter().map(|b| b.lipschitz).fold(0.0, f64::max);
     let delta = Quantiles::of(found.iter().flat_map(|b| b.delta.iter().copied()).collect());
     let median = |of: &dyn Fn(&Bounds) -> &Vec<f64>| -> Vec<f64> {

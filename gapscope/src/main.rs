@@ -22,7 +22,7 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Rollout(args) => rollout::run(&args),
-        Command::Study(study) => study::run(study),
+        Command::Study(study) => study::run(&study),
         Command::Demo(args) => demo::run(&args),
     };
     match result {

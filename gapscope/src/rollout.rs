@@ -123,7 +123,7 @@ fn summary(robot: &str, found: &Rollouts, options: &RolloutOptions) -> String {
 fn bounds(text: &mut String, name: &str, bound: &BoundGrowth) {
     let _ = writeln!(
         text,
-        "{name}: norm √(|q|² + |{} s · v|²), step {} s, {} stretches\n  δ median {}, 90 % {}, largest {} · L {} on the way, {} sampled over the region · logarithmic norm {} 1/s",
+        "{name}: norm √(qᵀMq + ({} s)² vᵀMv)/√m, step {} s, {} stretches\n  δ median {}, 90 % {}, largest {} · L {} on the way, {} sampled over the region · logarithmic norm {} 1/s",
         plain(bound.time),
         plain(bound.step),
         bound.stretches,

@@ -33,7 +33,7 @@ pub fn page(found: &Rollouts, robot: &str, joints: &[String], options: &RolloutO
                     section id="bounds" {
                         h2 { "Truth and bounds" }
                         p.lead { "What one-step errors and Jacobians allow, beside what happened: medians over stretches of the logs. "
-                            "The loose bound takes the largest δ and L there are." }
+                            "The loose bound takes the largest δ and L there are. M: mass matrix at the mean position; m: its mean diagonal entry." }
                         div.grid-two {
                             (bounds("model as described", "before", &found.nominal))
                             @if let Some(corrected) = &found.corrected { (bounds("model with the effects", "after", corrected)) }
@@ -134,7 +134,7 @@ fn bounds(name: &str, class: &'static str, model: &ModelRollouts) -> Markup {
     };
     let x = Axis::powers(bound.horizons.iter().copied(), "horizon, s");
     let all = bound.truth.iter().chain(&bound.tight).chain(&bound.loose).copied();
-    let y = Axis::powers(all, &format!("√(|q|² + |{} s · v|²)", plain(bound.time)));
+    let y = Axis::powers(all, &format!("√(qᵀMq + ({} s)² vᵀMv)/√m, rad or m", plain(bound.time)));
     html! {
         figure {
             figcaption { b { (name) } span.legend {

@@ -137,7 +137,7 @@ fn study(
 ) -> Result<Vec<Figure>> {
     let task = Task::reach(robot, &FROM, &TO, SPAN, DT);
     let model = || (contender.make)();
-    let mut computed = || ComputedTorque::new(model(), robot, &task, SERVO);
+    let computed = || ComputedTorque::new(model(), robot, &task, SERVO);
     let mut figures = Vec::new();
     let mut judge = |name: &'static str, make: &mut dyn FnMut() -> Box<dyn Controller>| -> Result<()> {
         let promised = drive(&mut *make(), &mut model(), &task);

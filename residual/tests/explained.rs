@@ -1,0 +1,98 @@
+//! The alarm rings for what can be learned and for nothing else, and quickly.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use gapscope_residual::{Alarm, explained_share};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+use std::time::Instant;
+
+const JOINTS: usize = 7;
+const ROWS: usize = 2000;
+
+/// q, v, a of smooth random motions, `[rows][21]`, and five folds of one motion each.
+fn motion(seed: u64) -> (Vec<f64>, Vec<usize>) {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut features = Vec::new();
+    let folds: Vec<usize> = (0..ROWS).map(|i| i * 5 / ROWS).collect();
+    let mut waves: Vec<[f64; 6]> = vec![];
+    for (i, fold) in folds.iter().enumerate() {
+        if i == 0 || folds[i - 1] != *fold {
+            waves = (0..JOINTS).map(|_| std::array::from_fn(|_| random.random_range(0.5..3.0))).collect();
+        }
+        let t = 0.02 * i as f64;
+        let derivative = |k: i32, w: &[f64; 6]| {
+            let wave = |a: f64, f: f64, p: f64| a * f.powi(k) * (f * t + p + f64::from(k) * 1.570_796_326_794_896_6).sin();
+            wave(0.3 * w[0], w[1], w[2]) + wave(0.2 * w[3], w[4], w[5])
+        };
+        for k in 0..3 {
+            features.extend(waves.iter().map(|w| derivative(k, w)));
+        }
+    }
+    (features, folds)
+}
+
+fn targets(features: &[f64], noise: f64, law: impl Fn(&[f64], usize) -> f64) -> Vec<f64> {
+    let mut random = Pcg64::seed_from_u64(9);
+    let row = |x: &[f64]| (0..JOINTS).map(|j| law(x, j)).collect::<Vec<f64>>();
+    let clean = features.chunks(3 * JOINTS).flat_map(row);
+    clean.map(|t| t + noise * random.sample::<f64, _>(StandardNormal)).collect()
+}
+
+#[test]
+fn noise_is_not_explained() {
+    let (features, folds) = motion(1);
+    let targets = targets(&features, 1.0, |_, _| 0.0);
+    let found = explained_share(&features, &targets, &folds, None, &Alarm::default()).unwrap();
+    assert!(found.share.abs() < 0.02, "{}", found.share);
+}
+
+#[test]
+fn an_effect_is_explained_and_its_noise_is_not() {
+    let (features, folds) = motion(2);
+    // Dry friction that rises towards standstill, a spring that stiffens, and noise of a third of their size.
+    let law = |x: &[f64], j: usize| -(1.0 + (-(x[JOINTS + j] / 0.1).powi(2)).exp()) * (x[JOINTS + j] / 0.02).tanh() + x[j].powi(3);
+    let clean = targets(&features, 0.0, law);
+    let mean_square = clean.iter().map(|t| t * t).sum::<f64>() / clean.len() as f64;
+    let noise = 0.3 * mean_square.sqrt();
+    let start = Instant::now();
+    let found = explained_share(&features, &targets(&features, noise, law), &folds, None, &Alarm::default()).unwrap();
+    let seconds = start.elapsed().as_secs_f64();
+    let most = 1.0 / 1.09;
+    assert!(found.share > 0.75 * most && found.share < 1.01 * most, "{}", found.share);
+    assert!(found.by_target.iter().all(|s| *s > 0.5), "{:?}", found.by_target);
+    assert_eq!(found.prediction.len(), ROWS * JOINTS);
+    // Bound for loaded machines; about a quarter of a second alone.
+    assert!(seconds < 5.0, "{seconds} s");
+}
+
+#[test]
+fn what_the_tangents_explain_does_not_count() {
+    let (features, folds) = motion(3);
+    // Viscous friction, with the tangent of exactly that: one column a joint.
+    let viscous = targets(&features, 0.05, |x, j| -3.0 * x[JOINTS + j]);
+    let mut tangents = vec![0.0; ROWS * JOINTS * JOINTS];
+    for (row, x) in features.chunks(3 * JOINTS).enumerate() {
+        (0..JOINTS).for_each(|j| tangents[(row * JOINTS + j) * JOINTS + j] = x[JOINTS + j]);
+    }
+    let share = |targets: &[f64], tangents: Option<&[f64]>| {
+        explained_share(&features, targets, &folds, tangents, &Alarm::default()).unwrap().share
+    };
+    assert!(share(&viscous, None) > 0.95);
+    assert!(share(&viscous, Some(&tangents)).abs() < 0.05);
+    let more = targets(&features, 0.05, |x, j| -3.0 * x[JOINTS + j] + x[j].powi(2));
+    assert!(share(&more, Some(&tangents)) > 0.8);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_share_and_bad_lengths_are_refused() {
+    let (features, folds) = motion(4);
+    let targets = targets(&features, 0.1, |x, j| x[j].sin());
+    let run = || explained_share(&features, &targets, &folds, None, &Alarm { neurons: 64, seed: 3 });
+    assert_eq!(run().unwrap(), run().unwrap());
+    let alarm = Alarm::default();
+    assert!(explained_share(&features[1..], &targets, &folds, None, &alarm).is_err());
+    assert!(explained_share(&features, &targets, &folds, Some(&[1.0]), &alarm).is_err());
+    assert!(explained_share(&features, &targets, &vec![0; ROWS], None, &alarm).is_err());
+    assert!(explained_share(&[], &[], &[], None, &alarm).is_err());
+}

@@ -23,7 +23,10 @@ fn write<T: Real>(folder: &Path, name: &str, sizes: &[usize], activation: Activa
         .map(|row| (0..sizes[0]).map(|i| T::from_f64((1.7 * (row * sizes[0] + i) as f64).sin())).collect())
         .collect();
     let y = x.iter().map(|x| network.forward_batch(&mut Pass::new(), x, 1).to_vec()).collect::<Vec<_>>();
-    std::fs::write(folder.join(format!("{name}.case.json")), serde_json::to_string(&serde_json::json!({"x": x, "y": y}))?)?;
+    std::fs::write(
+        folder.join(format!("{name}.case.json")),
+        serde_json::to_string(&serde_json::json!({"x": x, "y": y}))?,
+    )?;
     std::fs::write(folder.join(format!("{name}.json")), to_json(&network)?)?;
     std::fs::write(folder.join(format!("{name}.safetensors")), to_safetensors(&network)?)?;
     Ok(std::fs::write(folder.join(format!("{name}.onnx")), to_onnx(&network))?)

@@ -35,10 +35,7 @@ impl Normal {
     /// Maps rows to normal ones.
     pub fn apply<T: Real>(&self, rows: &[f64]) -> Vec<T> {
         let width = self.mean.len().max(1);
-        rows.iter()
-            .enumerate()
-            .map(|(i, x)| T::from_f64((x - self.mean[i % width]) / self.scale[i % width]))
-            .collect()
+        rows.iter().enumerate().map(|(i, x)| T::from_f64((x - self.mean[i % width]) / self.scale[i % width])).collect()
     }
 
     /// mean / scale: where zero lies, seen from the normal values.

@@ -104,8 +104,7 @@ pub fn train<T: Real>(
     }
     let (x_normal, t_normal) = (Normal::of(&train.inputs, inputs), Normal::of(&train.targets, outputs));
     let (x, t): (Vec<T>, Vec<T>) = (x_normal.apply(&train.inputs), t_normal.apply(&train.targets));
-    let test: Option<(Vec<T>, Vec<T>)> =
-        held_out.map(|h| (x_normal.apply(&h.inputs), t_normal.apply(&h.targets)));
+    let test: Option<(Vec<T>, Vec<T>)> = held_out.map(|h| (x_normal.apply(&h.inputs), t_normal.apply(&h.targets)));
     let shift: Vec<T> = t_normal.shift();
     let loss = Loss { penalty: T::from_f64(settings.penalty), shift: &shift };
 

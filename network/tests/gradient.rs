@@ -85,7 +85,8 @@ fn in_single_precision_is_that_in_double_precision_rounded() {
     let mut double = vec![0.0; wide.parameters().len()];
     let mut single = vec![0.0f32; double.len()];
     let a = Loss { penalty: 1e-3, shift: &[] }.gradient(&wide, &mut LossPass::new(), &x, &t, &mut double);
-    let b = Loss { penalty: 1e-3, shift: &[] }.gradient(&narrow, &mut LossPass::new(), &small(&x), &small(&t), &mut single);
+    let b =
+        Loss { penalty: 1e-3, shift: &[] }.gradient(&narrow, &mut LossPass::new(), &small(&x), &small(&t), &mut single);
     assert!((a - b).abs() < 1e-5 * a);
     let most = double.iter().fold(0.0f64, |m, g| m.max(g.abs()));
     assert!(double.iter().zip(&single).all(|(a, b)| (a - f64::from(*b)).abs() < 1e-5 * most));

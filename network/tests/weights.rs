@@ -50,7 +50,8 @@ fn a_network_trained_in_pytorch_gives_the_same_outputs() {
 
 #[test]
 fn one_hidden_layer_is_given_as_four_matrices() {
-    let network = from_json::<f64>(r#"{"W1": [[1, 2], [0, -1], [3, 1]], "b1": [0.5, 0, 0], "W2": [[1, 2, 3]], "b2": [-1]}"#);
+    let network =
+        from_json::<f64>(r#"{"W1": [[1, 2], [0, -1], [3, 1]], "b1": [0.5, 0, 0], "W2": [[1, 2, 3]], "b2": [-1]}"#);
     let (x, mut y) = ([0.3, -0.2], [0.0]);
     network.unwrap().forward(&mut Pass::new(), &x, &mut y);
     let expected = (0.3_f64 - 0.4 + 0.5).tanh() + 2.0 * 0.2_f64.tanh() + 3.0 * (0.9_f64 - 0.2).tanh() - 1.0;
@@ -93,7 +94,9 @@ fn a_mismatch_is_refused_with_both_shapes() {
     let bad = |text: &str| from_json::<f64>(text).unwrap_err();
     let error = bad(r#"{"W1": [[1, 2]], "b1": [0, 1]}"#);
     assert!(error.to_string().contains("2 numbers") && error.to_string().contains("1 × 2"), "{error}");
-    let WeightsError::Shape(error) = bad(r#"{"W1": [[1, 2]], "b1": [0], "W2": [[1, 2]], "b2": [0]}"#) else { unreachable!() };
+    let WeightsError::Shape(error) = bad(r#"{"W1": [[1, 2]], "b1": [0], "W2": [[1, 2]], "b2": [0]}"#) else {
+        unreachable!()
+    };
     assert_eq!(error, ShapeError::Row { layer: 2, row: 1, expected: 1, found: 2 });
     for (text, what) in [
         (r#"{"W1": [[1, 2], [1]], "b1": [0, 0]}"#, "row 2"),

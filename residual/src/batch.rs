@@ -52,7 +52,8 @@ impl<T: Real> HybridBatch<T> {
     fn block(&mut self, x: &mut [f64], tau: &[f64]) {
         let n = self.model.dof();
         let rows = tau.len() / n;
-        for (input, (x, tau)) in self.input.chunks_exact_mut(3 * n).zip(x.chunks_exact(2 * n).zip(tau.chunks_exact(n))) {
+        for (input, (x, tau)) in self.input.chunks_exact_mut(3 * n).zip(x.chunks_exact(2 * n).zip(tau.chunks_exact(n)))
+        {
             for (input, value) in input.iter_mut().zip(x.iter().chain(tau)) {
                 *input = T::from_f64(*value);
             }

@@ -103,8 +103,7 @@ pub fn explained_share(
             Some(phi) => subtract(&own, phi, &projection(&own, phi, k)),
             None => own,
         };
-        let moments: Vec<Mat<f64>> =
-            (0..parts.len()).map(|m| cross(&blocks[m], &rest[m], parts[m].len())).collect();
+        let moments: Vec<Mat<f64>> = (0..parts.len()).map(|m| cross(&blocks[m], &rest[m], parts[m].len())).collect();
         let Some(weights) = fit(k, &parts, &grams, &moments, &rest) else { continue };
         let outputs: Vec<Vec<f64>> = blocks.iter().map(|f| apply(f, &weights)).collect();
         let outputs = match &phi {
@@ -160,16 +159,25 @@ fn random_features(features: &[f64], width: usize, alarm: &Alarm) -> Vec<f64> {
     for row in normal.chunks_exact(width) {
         out.push(1.0);
         out.extend_from_slice(row);
-        out.extend(neurons.iter().map(|(slopes, b)| slopes.iter().map(|&(j, a)| a * row[j]).sum::<f64>() + b).map(f64::tanh));
+        out.extend(
+            neurons.iter().map(|(slopes, b)| slopes.iter().map(|&(j, a)| a * row[j]).sum::<f64>() + b).map(f64::tanh),
+        );
     }
     out
 }
 
 /// Weights from all folds but `k`, with the strength that predicts the other folds best, one at a time, `k` aside.
-fn fit(k: usize, parts: &[Vec<usize>], grams: &[Mat<f64>], moments: &[Mat<f64>], rest: &[Vec<f64>]) -> Option<Mat<f64>> {
+fn fit(
+    k: usize,
+    parts: &[Vec<usize>],
+    grams: &[Mat<f64>],
+    moments: &[Mat<f64>],
+    rest: &[Vec<f64>],
+) -> Option<Mat<f64>> {
     let without = |left_out: &[usize]| {
         let used = || (0..parts.len()).filter(|m| !left_out.contains(m));
-        let sum = |mats: &[Mat<f64>]| used().fold(Mat::zeros(mats[0].nrows(), mats[0].ncols()), |sum, m| sum + &mats[m]);
+        let sum =
+            |mats: &[Mat<f64>]| used().fold(Mat::zeros(mats[0].nrows(), mats[0].ncols()), |sum, m| sum + &mats[m]);
         let rows: usize = used().map(|m| parts[m].len()).sum();
         (sum(grams), sum(moments), rows)
     };

@@ -67,9 +67,8 @@ impl Tangents {
 pub(crate) fn coefficients(gram: &Mat<f64>, moment: &Mat<f64>) -> Vec<f64> {
     let p = gram.nrows();
     let size: Vec<f64> = (0..p).map(|i| gram[(i, i)].sqrt()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-    let scaled = |ridge: f64| {
-        Mat::from_fn(p, p, |i, j| gram[(i, j)] / (size[i] * size[j]) + if i == j { ridge } else { 0.0 })
-    };
+    let scaled =
+        |ridge: f64| Mat::from_fn(p, p, |i, j| gram[(i, j)] / (size[i] * size[j]) + if i == j { ridge } else { 0.0 });
     let right = Mat::from_fn(p, 1, |i, _| moment[(i, 0)] / size[i]);
     let factor = [1e-10, 1e-8, 1e-6].into_iter().find_map(|ridge| scaled(ridge).llt(Side::Lower).ok());
     match factor {

@@ -53,9 +53,8 @@ pub(crate) fn solve(gram: &Mat<f64>, moment: &Mat<f64>, rows: usize, penalty: f6
     let count = rows.max(1) as f64;
     let p = gram.nrows();
     let largest = (0..p).map(|i| gram[(i, i)]).fold(0.0, f64::max);
-    let system = Mat::from_fn(p, p, |i, j| {
-        (1.0 + penalty) * gram[(i, j)] / count + if i == j { strength } else { 0.0 }
-    });
+    let system =
+        Mat::from_fn(p, p, |i, j| (1.0 + penalty) * gram[(i, j)] / count + if i == j { strength } else { 0.0 });
     let factor = system.llt(Side::Lower).ok()?;
     let l = factor.L();
     // Rounding makes a singular matrix a barely definite one.

@@ -22,7 +22,8 @@ fn motion(seed: u64) -> (Vec<f64>, Vec<usize>) {
         }
         let t = 0.02 * i as f64;
         let derivative = |k: i32, w: &[f64; 6]| {
-            let wave = |a: f64, f: f64, p: f64| a * f.powi(k) * (f * t + p + f64::from(k) * 1.570_796_326_794_896_6).sin();
+            let wave =
+                |a: f64, f: f64, p: f64| a * f.powi(k) * (f * t + p + f64::from(k) * 1.570_796_326_794_896_6).sin();
             wave(0.3 * w[0], w[1], w[2]) + wave(0.2 * w[3], w[4], w[5])
         };
         for k in 0..3 {
@@ -51,7 +52,9 @@ fn noise_is_not_explained() {
 fn an_effect_is_explained_and_its_noise_is_not() {
     let (features, folds) = motion(2);
     // Dry friction that rises towards standstill, a spring that stiffens, and noise of a third of their size.
-    let law = |x: &[f64], j: usize| -(1.0 + (-(x[JOINTS + j] / 0.1).powi(2)).exp()) * (x[JOINTS + j] / 0.02).tanh() + x[j].powi(3);
+    let law = |x: &[f64], j: usize| {
+        -(1.0 + (-(x[JOINTS + j] / 0.1).powi(2)).exp()) * (x[JOINTS + j] / 0.02).tanh() + x[j].powi(3)
+    };
     let clean = targets(&features, 0.0, law);
     let mean_square = clean.iter().map(|t| t * t).sum::<f64>() / clean.len() as f64;
     let noise = 0.3 * mean_square.sqrt();

@@ -89,7 +89,8 @@ fn a_trained_network_shrinks_by_the_same_factor_within_three_percent() {
 fn under_noise_the_optimum_is_the_conditional_mean() {
     // Noise as large as the signal: a fit of single rows is off by that much, the conditional mean by far less.
     let noisy = rows(12_000, 1.0, 3);
-    let grid: Vec<f64> = (0..400).flat_map(|i| [f64::from(i % 20) * 0.18 - 1.71, f64::from(i / 20) * 0.18 - 1.71]).collect();
+    let grid: Vec<f64> =
+        (0..400).flat_map(|i| [f64::from(i % 20) * 0.18 - 1.71, f64::from(i / 20) * 0.18 - 1.71]).collect();
     let mean: Vec<f64> = grid.chunks(2).flat_map(|x| truth([x[0], x[1]])).collect();
     for lambda in [0.0, 0.5] {
         let y = comparable(&outputs(&trained(&noisy, lambda, 12), &grid));

@@ -12,13 +12,14 @@ use crate::output;
 use crate::report::terminal::{fill, pad};
 use crate::report::{figure, percent};
 use anyhow::{Context, Result, bail, ensure};
-use gapscope_dynamics::{Model, robots};
+use gapscope_dynamics::{Data, Model, robots};
 use gapscope_effects::{
     Armature, CoulombFriction, Effect, ParallelSpring, Payload, Plant, TorqueGainError, ViscousFriction,
 };
 use gapscope_rollout::control::{ComputedTorque, Controller, Ilqr, Mppi, MppiSettings, Task, run as drive};
 use indicatif::{ProgressBar, ProgressStyle};
 use models::{Contender, contenders};
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
@@ -32,9 +33,9 @@ const TO: [f64; 7] = [1.0, 0.3, -0.5, -1.4, 0.6, 2.2, -0.4];
 const SPAN: [f64; 2] = [1.0, 0.4];
 /// Computed torque: natural frequency, rad/s, and damping ratio of the tracking error.
 const SERVO: [f64; 2] = [10.0, 1.0];
-/// Steps that the sampling planner looks ahead, and the spread of its samples as a part of each joint's effort limit.
+/// Steps that the sampling planner looks ahead, and the spread of its samples as an acceleration of each joint, rad/s².
 const AHEAD: usize = 30;
-const SPREAD: f64 = 0.04;
+const SPREAD: f64 = 6.0;
 
 /// Cost promised and paid by one controller on one model.
 pub struct Figure {
@@ -156,10 +157,12 @@ fn study(
     judge("computed torque", &mut || Box::new(computed()))?;
     let plan = Ilqr::new(model(), &task).plan(&mut ComputedTorque::new(model(), robot, &task, SERVO));
     judge("iLQR", &mut || Box::new(plan.clone()))?;
+    let mut mass = DMatrix::zeros(robot.dof(), robot.dof());
+    robot.mass_matrix(&mut Data::new(robot), &FROM, &mut mass);
     let settings = MppiSettings {
         samples,
         horizon: AHEAD,
-        deviation: task.limit.iter().map(|limit| SPREAD * limit.min(100.0)).collect(),
+        deviation: mass.diagonal().iter().map(|inertia| SPREAD * inertia).collect(),
         correlation: 0.8,
         temperature: 0.05,
         seed: 1,
@@ -179,17 +182,18 @@ fn removed(figures: &[Figure], of: &Figure) -> Option<f64> {
 }
 
 /// One row a model, controllers side by side.
-fn rows(figures: &[Figure]) -> Vec<[String; 6]> {
+fn rows(figures: &[Figure]) -> Vec<[String; 7]> {
     figures
         .iter()
         .map(|f| {
             let shrink = removed(figures, f).map_or("–".into(), percent);
-            [f.effect.into(), f.controller.into(), f.model.into(), figure(f.promised), figure(f.paid), shrink]
+            let error = figure(1e3 * f.error);
+            [f.effect.into(), f.controller.into(), f.model.into(), figure(f.promised), figure(f.paid), error, shrink]
         })
         .collect()
 }
 
-const HEAD: [&str; 6] = ["hidden effect", "controller", "model", "promised", "paid", "gap removed"];
+const HEAD: [&str; 7] = ["hidden effect", "controller", "model", "promised", "paid", "error, mrad", "gap removed"];
 
 fn terminal(figures: &[Figure]) -> String {
     let width = [28, 17, 14];
@@ -212,9 +216,9 @@ fn markdown(figures: &[Figure]) -> String {
          another in 1 s and stands; the cost adds squared errors of position (100/rad²) and velocity (1/(rad/s)²) and the \
          effort off the nominal feedforward (10⁻⁴/(N m)²), over time. *Promised* is the cost of the loop on the model that the \
          controller trusts, *paid* on the robot with the hidden effect. *Gap removed* is 100 % where a model pays as little as the \
-         true effects do, 0 % where it pays what the nominal model does.\n\n![Promised and paid](closed-loop.svg)\n\n",
+         true effects do, 0 % where it pays what the nominal model does; *error* is the robot's position error, rms.\n\n![Promised and paid](closed-loop.svg)\n\n",
     );
-    let _ = writeln!(text, "| {} |\n|---|---|---|--:|--:|--:|", HEAD.join(" | "));
+    let _ = writeln!(text, "| {} |\n|---|---|---|--:|--:|--:|--:|", HEAD.join(" | "));
     for row in rows(figures) {
         let _ = writeln!(text, "| {} |", row.join(" | "));
     }

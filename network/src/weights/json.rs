@@ -13,7 +13,8 @@ use serde_json::{Map, Value};
 pub fn to_json<T: Real>(network: &Mlp<T>) -> Result<String, WeightsError> {
     let mut out = format!("{{\n  \"activation\": \"{}\"", network.activation());
     for (l, layer) in network.to_layers().iter().enumerate() {
-        for (name, text) in [(format!("W{}", l + 1), numbers(&layer.weight)), (format!("b{}", l + 1), numbers(&layer.bias))]
+        for (name, text) in
+            [(format!("W{}", l + 1), numbers(&layer.weight)), (format!("b{}", l + 1), numbers(&layer.bias))]
         {
             let text = text.map_err(|e| WeightsError::Format { format: "JSON", cause: e.to_string() })?;
             // serde_json writes what is not finite as null.

@@ -74,7 +74,11 @@ pub fn from_safetensors<T: Real>(bytes: &[u8]) -> Result<Mlp<T>, WeightsError> {
         if inputs == 0 || outputs == 0 || before.is_some_and(|b| b != inputs) {
             let inputs = before.map_or("inputs".into(), |b| b.to_string());
             let expected = format!("[outputs, {inputs}], after a layer of {inputs} outputs");
-            return Err(WeightsError::Tensor { name: weight.clone(), found: vec![outputs, tensor.shape()[1]], expected });
+            return Err(WeightsError::Tensor {
+                name: weight.clone(),
+                found: vec![outputs, tensor.shape()[1]],
+                expected,
+            });
         }
         let weight = numbers::<T>(weight, &tensor)?.chunks_exact(inputs).map(<[T]>::to_vec).collect();
         let bias = if found.contains(bias) {

@@ -1,18 +1,21 @@
 //! Computed torque on any model that steps: the effort that takes the model where it is wanted, found by inverting a step.
 
 use super::{Controller, Task};
-use gapscope_dynamics::{Data, Model, StepModel, invert};
-use nalgebra::DMatrix;
+use gapscope_dynamics::{Data, Model, StepModel};
+use nalgebra::{DMatrix, DVector};
 
 /// Most corrections of the effort a step, and the velocity error that ends them, rad/s or m/s.
-const ROUNDS: usize = 30;
+const ROUNDS: usize = 25;
 const SETTLED: f64 = 1e-9;
+/// A joint that answers to its torque by less than this part of what its inertia says is stuck.
+const STUCK: f64 = 1e-6;
 
 /// Feedback linearisation (Siciliano et al. 2009, section 8.5.2) in discrete time: the velocity wanted at the end of the
 /// step is v + dt (a_r + ω²(q_r − q) + 2ζω(v_r − v)), and the effort is the one under which the model gets there.
 ///
-/// That effort is the root of the model's step, found by Newton's method with the mass matrix of the rigid model as slope:
-/// it needs no derivatives, and finds its way out of dry friction, where they are zero.
+/// That effort is the root of the model's step, found by Newton's method on the model's Jacobian. A joint that dry
+/// friction holds does not answer to its torque: there the mass matrix of the rigid model stands in, and the push
+/// doubles until the joint moves.
 pub struct ComputedTorque<M> {
     model: M,
     rigid: Model,
@@ -21,7 +24,8 @@ pub struct ComputedTorque<M> {
     servo: [f64; 2],
     data: Data,
     mass: DMatrix<f64>,
-    inverse: DMatrix<f64>,
+    by_state: DMatrix<f64>,
+    by_torque: DMatrix<f64>,
     x: Vec<f64>,
     wanted: Vec<f64>,
 }
@@ -31,7 +35,7 @@ impl<M: StepModel> ComputedTorque<M> {
     /// damping ratio of the tracking error.
     pub fn new(model: M, rigid: &Model, task: &Task, servo: [f64; 2]) -> Self {
         let n = rigid.dof();
-        let x = vec![0.0; model.state_len()];
+        let len = model.state_len();
         Self {
             model,
             rigid: rigid.clone(),
@@ -39,8 +43,9 @@ impl<M: StepModel> ComputedTorque<M> {
             servo,
             data: Data::new(rigid),
             mass: DMatrix::zeros(n, n),
-            inverse: DMatrix::zeros(n, n),
-            x,
+            by_state: DMatrix::zeros(len, len),
+            by_torque: DMatrix::zeros(len, n),
+            x: vec![0.0; len],
             wanted: vec![0.0; n],
         }
     }
@@ -59,34 +64,28 @@ impl<M: StepModel> Controller for ComputedTorque<M> {
         }
         tau.copy_from_slice(self.task.effort_at(step));
         self.rigid.mass_matrix(&mut self.data, q, &mut self.mass);
-        let mass = self.mass.clone();
-        // The bodies' inertia without rotors may be near singular: the inverse guards its pivots.
-        invert(&mut self.mass, &mut self.inverse);
         let mut best = (f64::INFINITY, tau.to_vec());
-        let mut gain = 1.0;
+        let mut push_harder = 1.0;
         for _ in 0..ROUNDS {
             self.model.start(q, v, &mut self.x);
+            self.model.jacobian(&self.x, tau, &mut self.by_state, &mut self.by_torque);
             self.model.step(&mut self.x, tau);
-            let short = nalgebra::DVector::from_fn(n, |j, _| self.wanted[j] - self.x[n + j]);
+            let short = DVector::from_fn(n, |j, _| self.wanted[j] - self.x[n + j]);
             let miss = short.amax();
-            if !miss.is_finite() {
-                break;
-            }
             if miss < best.0 {
                 best = (miss, tau.to_vec());
-            } else {
-                // A model with more inertia or less friction than the slope assumes overshoots.
-                gain *= 0.5;
-                tau.copy_from_slice(&best.1);
-                if gain < 0.05 {
-                    break;
-                }
-                continue;
             }
-            if miss < SETTLED {
+            if miss < SETTLED || !miss.is_finite() {
                 break;
             }
-            let push = &mass * short * (gain / dt);
+            let mut slope = self.by_torque.rows(n, n).into_owned();
+            let stuck: Vec<usize> = (0..n).filter(|&j| slope[(j, j)] * self.mass[(j, j)] < STUCK * dt).collect();
+            for &j in &stuck {
+                slope.row_mut(j).fill(0.0);
+                slope[(j, j)] = dt / (self.mass[(j, j)] * push_harder);
+            }
+            push_harder = if stuck.is_empty() { 1.0 } else { 2.0 * push_harder };
+            let Some(push) = slope.lu().solve(&short) else { break };
             tau.iter_mut().zip(push.iter()).for_each(|(tau, push)| *tau += push);
             self.task.clamp(tau);
         }

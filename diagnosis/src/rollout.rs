@@ -21,7 +21,9 @@ const SHORTEST: f64 = 0.004;
 const STRETCHES: usize = 12;
 const POINTS: usize = 512;
 /// Times T of the norm that are tried, s.
-const TIMES: [f64; 7] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
+const TIMES: [f64; 9] = [0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0];
+/// How far rollouts are followed for that, s.
+const NEAR: f64 = 0.02;
 
 /// What is asked of [`rollouts`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -213,7 +215,7 @@ fn stretches(signals: &[Signals], options: &RolloutOptions) -> Vec<Stretch> {
     signals.iter().filter(|s| s.len() > 1).flat_map(of).collect()
 }
 
-/// The norm with the time T in which the loose bound of the nominal model ends nearest to the truth, and T.
+/// The norm with the time T in which the nominal model's L near the logs is least, and T.
 fn choose_norm(
     model: &Model,
     signals: &[Signals],
@@ -233,14 +235,12 @@ fn choose_norm(
         scale.view_mut((n, n), (n, n)).copy_from(&(&root * time));
         Norm::new(scale)
     };
-    let stretch = stretches(signals, options).into_iter().next()?;
-    let steps = stretch.efforts.len();
+    let near = RolloutOptions { horizon: NEAR, ..*options };
+    let stretches = stretches(signals, &near);
     let tried = TIMES.par_iter().filter_map(|&time| {
         let norm = norm(time)?;
-        let found = bounds(&mut plant(stretch.dt), &stretch.states, &stretch.efforts, &[steps], &norm);
-        // A bound beyond the largest number is as bad as any.
-        let off = found.map_or(f64::INFINITY, |found| found.loose[0] / found.truth[0]);
-        Some((off, time, norm))
+        let found = stretches.iter().filter_map(|s| bounds(&mut plant(s.dt), &s.states, &s.efforts, &[], &norm));
+        Some((found.map(|found| found.lipschitz).fold(0.0, f64::max), time, norm))
     });
     let tried: Vec<(f64, f64, Norm)> = tried.collect();
     tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, time, norm)| (time, norm))

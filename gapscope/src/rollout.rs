@@ -71,7 +71,7 @@ fn summary(robot: &str, found: &Rollouts, options: &RolloutOptions) -> String {
         let _ = write!(text, "{}{}{}", fill(&format!("{name} median"), 18), fill("10 %", 12), fill("90 %", 12));
     }
     text.push('\n');
-    for (h, horizon) in found.nominal.growth.horizons.iter().enumerate().filter(|(h, _)| h % 3 == 0) {
+    for horizon in found.nominal.growth.horizons.iter().step_by(3) {
         let _ = write!(text, "{}", pad(&plain(*horizon), 12));
         for (_, model) in &models {
             match model.growth.horizons.iter().position(|other| other == horizon) {
@@ -89,7 +89,6 @@ fn summary(robot: &str, found: &Rollouts, options: &RolloutOptions) -> String {
             }
         }
         text.push('\n');
-        let _ = h;
     }
     text.push('\n');
     for (name, model) in &models {
@@ -156,5 +155,52 @@ fn bounds(text: &mut String, name: &str, bound: &BoundGrowth) {
             fill(&figure(loose), 18),
             fill(&figure(loose / truth), 14)
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::Input;
+    use gapscope_datasets::{Recipe, generate, write_csv};
+    use gapscope_dynamics::robots;
+    use gapscope_effects::{Effect, ViscousFriction};
+
+    #[test]
+    fn a_log_gives_a_page_and_a_table_and_neither_overwrites() {
+        let dir = tempfile::tempdir().unwrap();
+        let robot = robots::model("double_pendulum").unwrap().unwrap().model;
+        let friction = ViscousFriction { viscous: [("joint1".into(), 0.2)].into() };
+        let recipe = Recipe { seconds: 3.0, rate: 200.0, ..Recipe::default() };
+        let log = generate(&robot, &[Effect::ViscousFriction(friction)], 1, &recipe, "log.csv").unwrap();
+        write_csv(&dir.path().join("log.csv"), &log, true).unwrap();
+        output::write(&dir.path().join("robot.urdf"), robots::double_pendulum()).unwrap();
+        let mut args = Rollout {
+            input: Input {
+                robot: dir.path().join("robot.urdf"),
+                logs: vec![dir.path().join("log.csv")],
+                map: vec![],
+                map_file: None,
+                lock: vec![],
+                allow_truncated: false,
+                skip_bad_logs: false,
+            },
+            with: None,
+            horizon: 0.5,
+            tolerance: 0.05,
+            fit_start: None,
+            starts: 20,
+            out: Some(dir.path().join("page.html")),
+            force: false,
+        };
+        let text = run(&args).unwrap();
+        assert!(text.contains("tight bound") && text.contains("leaves 0.05 rad after"), "{text}");
+        let page = std::fs::read_to_string(dir.path().join("page.html")).unwrap();
+        assert!(page.contains("joint2") && page.contains("tight bound") && !page.contains("NaN"));
+        assert!(run(&args).unwrap_err().to_string().contains("exists already"));
+        (args.force, args.fit_start) = (true, Some(0.1));
+        assert!(run(&args).is_ok());
+        args.horizon = f64::NAN;
+        assert!(run(&args).unwrap_err().to_string().contains("--horizon"));
     }
 }

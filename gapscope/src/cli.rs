@@ -133,7 +133,7 @@ pub struct ClosedLoop {
     #[arg(long)]
     pub force: bool,
     /// Samples of the sampling planner at each command
-    #[arg(long, default_value_t = 256)]
+    #[arg(long, default_value_t = 128)]
     pub samples: usize,
 }
 

@@ -30,11 +30,11 @@ const ROBOT_DT: f64 = 0.001;
 /// The motion: from and to, rad; time to get there and to stay, s.
 const FROM: [f64; 7] = [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.6];
 const TO: [f64; 7] = [1.0, 0.3, -0.5, -1.4, 0.6, 2.2, -0.4];
-const SPAN: [f64; 2] = [1.0, 0.4];
+const SPAN: [f64; 2] = [0.8, 0.2];
 /// Computed torque: natural frequency, rad/s, and damping ratio of the tracking error.
 const SERVO: [f64; 2] = [10.0, 1.0];
 /// Steps that the sampling planner looks ahead, and the spread of its samples as an acceleration of each joint, rad/s².
-const AHEAD: usize = 30;
+const AHEAD: usize = 20;
 const SPREAD: f64 = 6.0;
 
 /// Cost promised and paid by one controller on one model.
@@ -213,7 +213,7 @@ fn terminal(figures: &[Figure]) -> String {
 fn markdown(figures: &[Figure]) -> String {
     let mut text = String::from(
         "# The closed-loop gap\n\nWhat `gapscope study closed-loop` prints. The built-in 7-joint arm reaches from one posture to \
-         another in 1 s and stands; the cost adds squared errors of position (100/rad²) and velocity (1/(rad/s)²) and the \
+         another in 0.8 s and stands for 0.2 s; the cost adds squared errors of position (100/rad²) and velocity (1/(rad/s)²) and the \
          effort off the nominal feedforward (10⁻⁴/(N m)²), over time. *Promised* is the cost of the loop on the model that the \
          controller trusts, *paid* on the robot with the hidden effect. *Gap removed* is 100 % where a model pays as little as the \
          true effects do, 0 % where it pays what the nominal model does; *error* is the robot's position error, rms.\n\n![Promised and paid](closed-loop.svg)\n\n",

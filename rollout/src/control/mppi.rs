@@ -108,7 +108,7 @@ impl<M: StepModel + Send> Mppi<M> {
         let temperature = (self.settings.temperature * (mean - least)).max(f64::MIN_POSITIVE);
         let weight = |cost: f64| if cost.is_finite() { (-(cost - least) / temperature).exp() } else { 0.0 };
         let total: f64 = self.blocks.iter().flat_map(|b| b.cost).map(weight).sum();
-        if !(total > 0.0) {
+        if total <= 0.0 {
             return;
         }
         for block in &self.blocks {

@@ -67,7 +67,7 @@ fn learned(robot: &Model, logs: &[Episode]) -> Result<(Contender, Contender)> {
     ))
 }
 
-/// Steps of the models' length, one from every sample: the velocity is the slope of a parabola through the positions
+/// Steps of the models' length, one from every second sample: the velocity is the slope of a parabola through the positions
 /// around it (Savitzky and Golay 1964), the torque the mean of the efforts held.
 fn transitions(robot: &Model, logs: &[Episode]) -> Transitions {
     let n = robot.dof();
@@ -82,7 +82,7 @@ fn transitions(robot: &Model, logs: &[Episode]) -> Transitions {
             };
             log.position.iter().map(|q| q[k]).chain(log.position.iter().map(slope)).collect()
         };
-        for k in REACH..log.len().saturating_sub(REACH + stride) {
+        for k in (REACH..log.len().saturating_sub(REACH + stride)).step_by(2) {
             let mean = |effort: &Vec<f64>| effort[k..k + stride].iter().sum::<f64>() / stride as f64;
             let tau: Vec<f64> = log.effort.iter().map(mean).collect();
             seen.push(&state(k), &tau, &state(k + stride));

@@ -30,6 +30,9 @@ pub struct Ilqr<'a, M> {
     task: &'a Task,
 }
 
+/// Feedforward and feedback of each step.
+type Policy = (Vec<DVector<f64>>, Vec<DMatrix<f64>>);
+
 /// The motion so far.
 struct Motion {
     cost: f64,
@@ -112,8 +115,8 @@ impl<'a, M: StepModel> Ilqr<'a, M> {
         next
     }
 
-    /// Feedforward and feedback of each step; `None` where a curvature is not positive.
-    fn backward(&mut self, motion: &Motion, ridge: f64) -> Option<(Vec<DVector<f64>>, Vec<DMatrix<f64>>)> {
+    /// The step that the quadratic model asks for; `None` where a curvature is not positive.
+    fn backward(&mut self, motion: &Motion, ridge: f64) -> Option<Policy> {
         let (n, len, steps) = (self.task.joints(), self.model.state_len(), self.task.steps());
         let (mut by_state, mut by_torque) = (DMatrix::zeros(len, len), DMatrix::zeros(len, n));
         let (mut feedforward, mut feedback) = (vec![DVector::zeros(n); steps], vec![DMatrix::zeros(n, len); steps]);

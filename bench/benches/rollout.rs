@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use gapscope_dynamics::{Data, Discrete, Integrator, Model, StepModel, robots};
+use gapscope_dynamics::{Data, Discrete, Integrator, Model, robots};
 use gapscope_network::{Activation, Init, Mlp, Net};
 use gapscope_residual::{Hybrid, On};
 use gapscope_rollout::Batch;

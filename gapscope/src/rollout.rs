@@ -173,7 +173,7 @@ mod tests {
         let friction = ViscousFriction { viscous: [("joint1".into(), 0.2)].into() };
         let recipe = Recipe { seconds: 3.0, rate: 200.0, ..Recipe::default() };
         let log = generate(&robot, &[Effect::ViscousFriction(friction)], 1, &recipe, "log.csv").unwrap();
-        write_csv(&dir.path().join("log.csv"), &log, true).unwrap();
+        write_csv(dir.path().join("log.csv"), &log, true).unwrap();
         output::write(&dir.path().join("robot.urdf"), robots::double_pendulum()).unwrap();
         let mut args = Rollout {
             input: Input {

@@ -186,7 +186,10 @@ fn rows(figures: &[Figure]) -> Vec<[String; 7]> {
     figures
         .iter()
         .map(|f| {
-            let shrink = removed(figures, f).map_or("–".into(), percent);
+            let shrink = match removed(figures, f) {
+                Some(part) if part < 0.0 => "worse".into(),
+                part => part.map_or("–".into(), percent),
+            };
             let error = figure(1e3 * f.error);
             [f.effect.into(), f.controller.into(), f.model.into(), figure(f.promised), figure(f.paid), error, shrink]
         })
@@ -216,7 +219,7 @@ fn markdown(figures: &[Figure]) -> String {
          another in 0.8 s and stands for 0.2 s; the cost adds squared errors of position (100/rad²) and velocity (1/(rad/s)²) and the \
          effort off the nominal feedforward (10⁻⁴/(N m)²), over time. *Promised* is the cost of the loop on the model that the \
          controller trusts, *paid* on the robot with the hidden effect. *Gap removed* is 100 % where a model pays as little as the \
-         true effects do, 0 % where it pays what the nominal model does; *error* is the robot's position error, rms.\n\n![Promised and paid](closed-loop.svg)\n\n",
+         true effects do, 0 % where it pays what the nominal model does, *worse* where it pays more; *error* is the robot's position error, rms.\n\n![Promised and paid](closed-loop.svg)\n\n",
     );
     let _ = writeln!(text, "| {} |\n|---|---|---|--:|--:|--:|--:|", HEAD.join(" | "));
     for row in rows(figures) {

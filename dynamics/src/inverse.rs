@@ -49,6 +49,7 @@ pub fn invert(matrix: &mut DMatrix<f64>, inverse: &mut DMatrix<f64>) {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use approx::assert_relative_eq;

@@ -37,14 +37,14 @@ pub fn transitions(episode: &Episode, dt: f64) -> Transitions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Recipe, generate};
+    use crate::{Recipe, Sensors, generate};
     use gapscope_dynamics::robots;
     use gapscope_effects::Plant;
 
     #[test]
     fn the_robot_that_made_a_log_explains_its_steps() {
         let model = robots::model("arm6").unwrap().unwrap().model;
-        let recipe = Recipe { seconds: 3.0, position_noise: 0.0, effort_noise: 0.0, ..Recipe::default() };
+        let recipe = Recipe { seconds: 3.0, sensors: Sensors::IDEAL, ..Recipe::default() };
         let log = generate(&model, &[], 1, &recipe, "a.csv").unwrap();
         let seen = transitions(&log, 0.01);
         assert_eq!((seen.len(), seen.joints, seen.dt), (299, 6, 0.01));

@@ -49,6 +49,11 @@ def state(model, random, first):
     out["coriolis_matrix"] = pin.computeCoriolisMatrix(model, data, positions, v)
     out["kinetic_energy"] = pin.computeKineticEnergy(model, data, positions, v)
     out["potential_energy"] = pin.computePotentialEnergy(model, data, positions)
+    by_position, by_velocity, _ = pin.computeRNEADerivatives(model, data, positions, v, a)
+    out["torque_by_position"], out["torque_by_velocity"] = by_position.copy(), by_velocity.copy()
+    by_position, by_velocity, by_torque = pin.computeABADerivatives(model, data, positions, v, tau)
+    out["acceleration_by_position"], out["acceleration_by_velocity"] = by_position.copy(), by_velocity.copy()
+    out["acceleration_by_torque"] = np.triu(by_torque) + np.triu(by_torque, 1).T
     pin.forwardKinematics(model, data, positions)
     out["rotations"] = [place.rotation for place in data.oMi[1:]]
     out["translations"] = [place.translation for place in data.oMi[1:]]

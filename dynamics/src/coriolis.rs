@@ -3,8 +3,8 @@
 use crate::data::Data;
 use crate::model::{Inertia, Model};
 use crate::spatial::{Force, Motion};
-use glam::DVec3;
-use nalgebra::{DMatrix, Matrix6, Vector6};
+use glam::{DMat3, DVec3};
+use nalgebra::DMatrix;
 
 impl Model {
     /// Coriolis matrix C(q, v) (n×n) with C v the Coriolis and centrifugal torques and Ṁ − 2C skew-symmetric: the
@@ -30,65 +30,69 @@ impl Model {
             data.subspace[i] = s;
             data.subspace_rate[i] = velocity.cross(s);
             data.composite[i] = inertia;
-            data.coriolis[i] = body_coriolis(&inertia, velocity);
+            data.coriolis[i] = VelocityProduct::new(&inertia, velocity);
         }
         coriolis.fill(0.0);
         for (i, joint) in self.joints().iter().enumerate().rev() {
             if let Some(parent) = joint.parent {
                 data.composite[parent] = data.composite[parent].add(&data.composite[i]);
-                let lump = data.coriolis[i];
-                data.coriolis[parent] += lump;
+                data.coriolis[parent] = data.coriolis[parent].add(&data.coriolis[i]);
             }
             let s = data.subspace[i];
-            let lump = &data.coriolis[i];
+            let product = data.coriolis[i];
             // Column i, all rows from i down to the base; and row i, those columns.
-            let column = data.composite[i].apply(data.subspace_rate[i]) + force(lump * vector(s));
+            let column = data.composite[i].apply(data.subspace_rate[i]) + product.apply(s);
             let momentum = data.composite[i].apply(s);
-            let row = motion(lump.tr_mul(&vector(s)));
+            let row = product.transpose_apply(s);
             coriolis[(i, i)] = s.dot(column);
             let mut next = joint.parent;
             while let Some(j) = next {
                 let other = data.subspace[j];
                 coriolis[(j, i)] = other.dot(column);
-                coriolis[(i, j)] =
-                    data.subspace_rate[j].dot(momentum) + row.angular.dot(other.angular) + row.linear.dot(other.linear);
+                coriolis[(i, j)] = data.subspace_rate[j].dot(momentum) + row.dot(other.angular);
                 next = self.joints()[j].parent;
             }
         }
     }
 }
 
-/// B = ½[(v×*) I − I (v×) + (I v) ×̄*], angular rows first.
-fn body_coriolis(inertia: &Inertia, velocity: Motion) -> Matrix6<f64> {
-    let momentum = inertia.apply(velocity);
-    let mut out = Matrix6::zeros();
-    for k in 0..6 {
-        let mut unit = [0.0; 6];
-        unit[k] = 1.0;
-        let e =
-            Motion { angular: DVec3::new(unit[0], unit[1], unit[2]), linear: DVec3::new(unit[3], unit[4], unit[5]) };
-        let a = velocity.cross_force(inertia.apply(e));
-        let b = inertia.apply(velocity.cross(e));
-        let c = e.cross_force(momentum);
-        let column =
-            Force { moment: 0.5 * (a.moment - b.moment + c.moment), force: 0.5 * (a.force - b.force + c.force) };
-        out.set_column(k, &vector_of(column.moment, column.force));
+/// What a body's motion makes of other motions, B = ½[(v×*) I − I (v×) + (I v) ×̄*]: a moment and a force that are
+/// linear in the angular part e of a motion, `moment` e and e × `momentum`; the linear part drops out by Jacobi's
+/// identity.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct VelocityProduct {
+    moment: DMat3,
+    momentum: DVec3,
+}
+
+impl VelocityProduct {
+    pub const ZERO: Self = Self { moment: DMat3::ZERO, momentum: DVec3::ZERO };
+
+    /// Of one body: moment e = −ω × (Σ e) − h × (v × e) with Σ = ½ tr(I) 1 − I, h its first moment and v the velocity
+    /// of its point at the origin.
+    pub fn new(inertia: &Inertia, velocity: Motion) -> Self {
+        let (omega, h, v) = (velocity.angular, inertia.first_moment, velocity.linear);
+        let i = inertia.rotational;
+        let second = DMat3::from_diagonal(DVec3::splat(0.5 * (i.x_axis.x + i.y_axis.y + i.z_axis.z))) - i;
+        let column = |e: DVec3| -omega.cross(second * e) - h.cross(v.cross(e));
+        Self {
+            moment: DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z)),
+            momentum: inertia.mass * v + omega.cross(h),
+        }
     }
-    out
-}
 
-fn vector_of(top: DVec3, bottom: DVec3) -> Vector6<f64> {
-    Vector6::new(top.x, top.y, top.z, bottom.x, bottom.y, bottom.z)
-}
+    /// Of both bodies joined.
+    pub fn add(&self, other: &Self) -> Self {
+        Self { moment: self.moment + other.moment, momentum: self.momentum + other.momentum }
+    }
 
-fn vector(m: Motion) -> Vector6<f64> {
-    vector_of(m.angular, m.linear)
-}
+    /// B m.
+    pub fn apply(&self, m: Motion) -> Force {
+        Force { moment: self.moment * m.angular, force: m.angular.cross(self.momentum) }
+    }
 
-fn force(v: Vector6<f64>) -> Force {
-    Force { moment: DVec3::new(v[0], v[1], v[2]), force: DVec3::new(v[3], v[4], v[5]) }
-}
-
-fn motion(v: Vector6<f64>) -> Motion {
-    Motion { angular: DVec3::new(v[0], v[1], v[2]), linear: DVec3::new(v[3], v[4], v[5]) }
+    /// Bᵀ m: its linear part is zero.
+    pub fn transpose_apply(&self, m: Motion) -> DVec3 {
+        self.moment.transpose() * m.angular + self.momentum.cross(m.linear)
+    }
 }

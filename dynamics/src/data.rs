@@ -1,12 +1,13 @@
 //! Scratch for the algorithms.
 
+use crate::coriolis::VelocityProduct;
 use crate::kernel::Kernel;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512};
 use crate::model::{Inertia, Model, Placement};
 use crate::real::One;
-use crate::spatial::Motion;
-use nalgebra::Matrix6;
+use crate::spatial::{Force, Motion};
+use nalgebra::DMatrix;
 
 /// Reusable scratch for one thread: every buffer that the in-place methods of [`Model`] need, and the results of
 /// [`Model::forward_kinematics`]. Made once, for models of the same number of joints.
@@ -16,9 +17,14 @@ pub struct Data {
     pub(crate) world_from_link: Vec<Placement>,
     pub(crate) velocity: Vec<Motion>,
     pub(crate) composite: Vec<Inertia>,
-    pub(crate) coriolis: Vec<Matrix6<f64>>,
+    pub(crate) coriolis: Vec<VelocityProduct>,
     pub(crate) subspace: Vec<Motion>,
     pub(crate) subspace_rate: Vec<Motion>,
+    pub(crate) acceleration: Vec<Motion>,
+    pub(crate) force: Vec<Force>,
+    pub(crate) drift: Vec<Motion>,
+    pub(crate) drift_rate: Vec<Motion>,
+    pub(crate) square: [DMatrix<f64>; 3],
     pub(crate) zero: Vec<f64>,
     pub(crate) kernel: Kernel<One<true>, One<true>>,
 }
@@ -43,9 +49,14 @@ impl Data {
             world_from_link: vec![Placement::IDENTITY; n],
             velocity: vec![Motion::default(); n],
             composite: vec![Inertia::ZERO; n],
-            coriolis: vec![Matrix6::zeros(); n],
+            coriolis: vec![VelocityProduct::ZERO; n],
             subspace: vec![Motion::default(); n],
             subspace_rate: vec![Motion::default(); n],
+            acceleration: vec![Motion::default(); n],
+            force: vec![Force::default(); n],
+            drift: vec![Motion::default(); n],
+            drift_rate: vec![Motion::default(); n],
+            square: std::array::from_fn(|_| DMatrix::zeros(n, n)),
             zero: vec![0.0; n],
             kernel: Kernel::new(n),
         }

@@ -1,5 +1,5 @@
-//! Rigid-body dynamics of robot arms: the model, inverse and forward dynamics, mass matrix, Coriolis matrix,
-//! regressor, base parameters and discrete steps.
+//! Rigid-body dynamics of robot arms: the model, inverse and forward dynamics with their derivatives, mass
+//! matrix, Coriolis matrix, regressor, base parameters, discrete and adaptive steps.
 //!
 //! A [`Model`] is immutable and shared; a [`Data`] is the scratch of one thread. Every in-place method is
 //! `model.name(&mut data, q, ..., &mut out)` and allocates nothing. World is the base frame, and the public frames
@@ -32,10 +32,14 @@
 mod base_parameters;
 mod coriolis;
 mod data;
+mod derivatives;
+mod discrete;
+mod dormand_prince;
 mod energy;
 mod finding;
 mod forward_dynamics;
 mod inertia;
+mod inverse;
 mod inverse_dynamics;
 mod kernel;
 mod kinematics;
@@ -58,9 +62,12 @@ mod vector;
 
 pub use base_parameters::{BaseParameters, base_parameters};
 pub use data::{Data, LaneData};
+pub use discrete::{Discrete, Integrator};
+pub use dormand_prince::{Adaptive, Dense, DormandPrince, StepError};
 pub use finding::Finding;
+pub use inverse::invert;
 pub use model::{GRAVITY, Inertia, Joint, JointKind, Limits, Model, ModelError, Placement};
 pub use real::LANES;
-pub use step::{Discrete, Integrator, StepModel};
+pub use step::{StepModel, central_differences};
 pub use transitions::Transitions;
 pub use urdf::{LinkFrame, Loaded, UrdfError};

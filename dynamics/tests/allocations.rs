@@ -3,7 +3,7 @@
 
 mod common;
 
-use gapscope_dynamics::{Data, Discrete, Integrator, LANES, LaneData, StepModel};
+use gapscope_dynamics::{Adaptive, Data, Discrete, Integrator, LANES, LaneData, StepModel};
 use glam::DVec3;
 use nalgebra::DMatrix;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -68,6 +68,11 @@ fn in_place_methods_allocate_nothing() {
     assert_allocates_nothing(|| model.forward_dynamics(&mut data, &q, &v, &a, &mut out));
     assert_allocates_nothing(|| model.mass_matrix(&mut data, &q, &mut square));
     assert_allocates_nothing(|| model.coriolis_matrix(&mut data, &q, &v, &mut square));
+    let [mut one, mut two, mut three] = std::array::from_fn(|_| DMatrix::zeros(n, n));
+    assert_allocates_nothing(|| model.inverse_dynamics_derivatives(&mut data, &q, &v, &a, &mut one, &mut two));
+    assert_allocates_nothing(|| {
+        model.forward_dynamics_derivatives(&mut data, &q, &v, &a, &mut out, &mut one, &mut two, &mut three);
+    });
     assert_allocates_nothing(|| model.forward_kinematics(&mut data, &q));
     assert_allocates_nothing(|| model.jacobian(&mut data, &q, n - 1, DVec3::X, &mut jacobian));
     assert_allocates_nothing(|| {
@@ -94,9 +99,20 @@ fn steps_allocate_nothing() {
     for integrator in [Integrator::ExplicitEuler, Integrator::SemiImplicitEuler, Integrator::Rk4] {
         let mut steps = Discrete::new(model.clone(), 1e-3, integrator);
         let mut x = vec![0.0; steps.state_len()];
+        let mut batch = vec![0.1; 11 * 2 * n];
+        let torques = vec![0.1; 11 * n];
+        let (mut by_state, mut by_torque) = (DMatrix::zeros(2 * n, 2 * n), DMatrix::zeros(2 * n, n));
         assert_allocates_nothing(|| {
             steps.start(&q, &v, &mut x);
             steps.step(&mut x, &tau);
+            steps.step_batch(&mut batch, &torques);
+            steps.jacobian(&x, &tau, &mut by_state, &mut by_torque);
         });
     }
+    let mut steps = Adaptive::new(model, 1e-3, 1e-8);
+    let mut x = vec![0.0; steps.state_len()];
+    assert_allocates_nothing(|| {
+        steps.start(&q, &v, &mut x);
+        steps.step(&mut x, &tau);
+    });
 }

@@ -21,14 +21,17 @@ pub enum Command {
     Diagnose(Diagnose),
     /// Measure the gap on other logs, before and after the corrections that a diagnosis found
     Evaluate(Evaluate),
+    /// Show how the model's error grows over the horizon, beside what one-step errors and Jacobians allow
+    Rollout(Rollout),
+    /// Run a study of this project's own, as its documents show it
+    #[command(subcommand)]
+    Study(Study),
     /// Diagnose a withheld effect on the built-in 7-joint arm, then reveal it
     Demo(Demo),
     /// Simulate logs of a robot with effects that its URDF lacks
     Generate(Generate),
     /// Train a network on logs: a residual on top of the robot's model, or a pure one without it
     Train(Train),
-    /// Measure what residual and pure learning need and where they fail, on a simulated arm
-    Study(Study),
     /// Make cases with a sealed effect, and score how well it is found
     #[command(subcommand)]
     Withheld(Withheld),
@@ -100,6 +103,64 @@ pub struct Evaluate {
     /// Replace the predictions file if it exists
     #[arg(long)]
     pub force: bool,
+}
+
+/// Arguments of `rollout`.
+#[derive(Debug, Args)]
+pub struct Rollout {
+    /// Robot and logs
+    #[command(flatten)]
+    pub input: Input,
+    /// Corrected model that `diagnose` wrote
+    #[arg(long, value_name = "FILE")]
+    pub with: Option<PathBuf>,
+    /// Longest horizon, s
+    #[arg(long, default_value_t = 1.0)]
+    pub horizon: f64,
+    /// Position error over all joints at which a rollout has left the log, rad or m
+    #[arg(long, default_value_t = 0.05)]
+    pub tolerance: f64,
+    /// Fit each rollout's initial state to this many seconds of the log: for noisy logs
+    #[arg(long, value_name = "SECONDS")]
+    pub fit_start: Option<f64>,
+    /// Rollouts over all logs
+    #[arg(long, default_value_t = 240)]
+    pub starts: usize,
+    /// Page to write [default: rollout.html in a new folder beside the first log]
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Replace the page if it exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Studies.
+#[derive(Debug, Subcommand)]
+pub enum Study {
+    /// Plan in the model, deploy on a robot with a hidden effect: what was promised and what is paid
+    ClosedLoop(ClosedLoop),
+    /// Learning: error against number of samples, at several sizes of mismatch
+    Samples(Learning),
+    /// Learning: inside and outside the region of the training data
+    Region(Learning),
+    /// Learning: physics of the wrong structure, a joint is missing
+    Structure(Learning),
+    /// Learning: data from the controller in use against data from elsewhere
+    Policy(Learning),
+}
+
+/// Arguments of `study closed-loop`.
+#[derive(Debug, Args)]
+pub struct ClosedLoop {
+    /// Folder for closed-loop.md and closed-loop.svg [default: a new folder in the current one]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace them if they exist
+    #[arg(long)]
+    pub force: bool,
+    /// Samples of the sampling planner at each command
+    #[arg(long, default_value_t = 128)]
+    pub samples: usize,
 }
 
 /// Arguments of `demo`.
@@ -301,25 +362,9 @@ fn on(text: &str) -> Result<On, String> {
     }
 }
 
-/// Which study.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Topic {
-    /// Error against number of samples, at several sizes of mismatch
-    Samples,
-    /// Inside and outside the region of the training data
-    Region,
-    /// Physics of the wrong structure: a joint is missing
-    Structure,
-    /// Data from the controller in use against data from elsewhere
-    Policy,
-}
-
-/// Arguments of `study`.
+/// Arguments of the studies of learning.
 #[derive(Debug, Args)]
-pub struct Study {
-    /// Which one
-    #[arg(value_enum)]
-    pub topic: Topic,
+pub struct Learning {
     /// Folder for the table, its CSV and its picture
     #[arg(long, default_value = "docs/studies", value_name = "DIR")]
     pub out: PathBuf,

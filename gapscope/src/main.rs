@@ -10,6 +10,7 @@ mod input;
 mod output;
 mod picture;
 mod report;
+mod rollout;
 mod study;
 mod summary;
 mod train;
@@ -24,10 +25,11 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Rollout(args) => rollout::run(&args),
+        Command::Study(study) => study::run(&study),
         Command::Demo(args) => demo::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Train(args) => train::run(&args),
-        Command::Study(args) => study::run(&args),
         Command::Withheld(args) => withheld::run(&args),
     };
     match result {

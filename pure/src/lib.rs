@@ -67,6 +67,15 @@ impl<R: Regressor> StepModel for Pure<R> {
         self.change.predict(&self.input, &mut self.output);
         x.iter_mut().zip(&self.output).for_each(|(x, change)| *x += change);
     }
+    /// All states through the map in one batch. Allocates.
+    fn step_batch(&mut self, x: &mut [f64], tau: &[f64]) {
+        let n = self.joints;
+        let rows = x.chunks_exact(2 * n).zip(tau.chunks_exact(n));
+        let input: Vec<f64> = rows.flat_map(|(x, tau)| x.iter().chain(tau).copied()).collect();
+        let mut change = vec![0.0; x.len()];
+        self.change.predict_batch(&input, &mut change);
+        x.iter_mut().zip(&change).for_each(|(x, change)| *x += change);
+    }
 }
 
 #[cfg(test)]

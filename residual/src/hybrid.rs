@@ -36,6 +36,9 @@ pub struct Hybrid<P, R> {
     input: Vec<f64>,
     correction: Vec<f64>,
     tau: Vec<f64>,
+    /// The same for a batch.
+    inputs: Vec<f64>,
+    corrections: Vec<f64>,
 }
 
 impl<P: StepModel, R: Regressor> Hybrid<P, R> {
@@ -50,7 +53,7 @@ impl<P: StepModel, R: Regressor> Hybrid<P, R> {
             return Err(ShapeError::Network { expected, found }.into());
         }
         let (input, correction, tau) = (vec![0.0; 3 * n], vec![0.0; on.outputs(n)], vec![0.0; n]);
-        Ok(Self { physics, residual, on, input, correction, tau })
+        Ok(Self { physics, residual, on, input, correction, tau, inputs: vec![], corrections: vec![] })
     }
 
     /// The physics without the correction.
@@ -101,6 +104,36 @@ impl<P: StepModel, R: Regressor> StepModel for Hybrid<P, R> {
                     self.tau[j] = tau[j] + r[j];
                 }
                 self.physics.step(x, &self.tau);
+            }
+        }
+    }
+    /// The physics and the correction each in one batch. Allocates where it is larger than ever before.
+    fn step_batch(&mut self, x: &mut [f64], tau: &[f64]) {
+        let (n, len, out) = (self.tau.len(), self.state_len(), self.on.outputs(self.tau.len()));
+        let rows = tau.len() / n;
+        self.inputs.resize(rows * 3 * n, 0.0);
+        self.corrections.resize(rows * out, 0.0);
+        let states = x.chunks_exact(len).zip(tau.chunks_exact(n));
+        for (input, (x, tau)) in self.inputs.chunks_exact_mut(3 * n).zip(states) {
+            input[..2 * n].copy_from_slice(&x[..2 * n]);
+            input[2 * n..].copy_from_slice(tau);
+        }
+        self.residual.predict_batch(&self.inputs, &mut self.corrections);
+        let dt = self.physics.dt();
+        if self.on == On::Torque {
+            self.corrections.iter_mut().zip(tau).for_each(|(r, tau)| *r += tau);
+            self.physics.step_batch(x, &self.corrections);
+            return;
+        }
+        self.physics.step_batch(x, tau);
+        for (x, r) in x.chunks_exact_mut(len).zip(self.corrections.chunks_exact(out)) {
+            if self.on == On::NextState {
+                x.iter_mut().zip(r).for_each(|(x, r)| *x += r);
+            } else {
+                for j in 0..n {
+                    x[j] += dt * dt * r[j];
+                    x[n + j] += dt * r[j];
+                }
             }
         }
     }

@@ -87,6 +87,12 @@ impl Actuation {
     pub(super) fn at_joint(&self, j: usize, effort: f64) -> f64 {
         (self.gain[j] * effort + self.bias[j]).clamp(-self.limit[j], self.limit[j])
     }
+
+    /// ∂[`Actuation::at_joint`]/∂effort: the gain, and zero where the effort is clipped.
+    pub(super) fn slope(&self, j: usize, effort: f64) -> f64 {
+        let free = (self.gain[j] * effort + self.bias[j]).abs() < self.limit[j];
+        if free { self.gain[j] } else { 0.0 }
+    }
 }
 
 #[cfg(test)]

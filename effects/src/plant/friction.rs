@@ -49,6 +49,15 @@ impl Direction {
         }
         bound
     }
+
+    /// ∂bound/∂speed, N m s/rad.
+    pub(super) fn bound_slope(&self, speed: f64) -> f64 {
+        if self.static_rise == 0.0 {
+            return 0.0;
+        }
+        let ratio = speed / self.stribeck_velocity;
+        -2.0 * ratio / self.stribeck_velocity * self.static_rise * (-ratio * ratio).exp()
+    }
 }
 
 /// Bristles on one joint: Dahl's friction, ż = s − σ abs(s) z / f with the force −σ z.
@@ -85,16 +94,16 @@ impl Bristle {
 /// One unknown impulse of the step, along a combination of speeds.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
-    parts: Vec<(usize, f64)>,
-    law: Law,
-    impulse: f64,
-    mobility: f64,
+    pub(super) parts: Vec<(usize, f64)>,
+    pub(super) law: Law,
+    pub(super) impulse: f64,
+    pub(super) mobility: f64,
     /// Greatest impulse, N m s; the scale of what has settled.
-    limit: f64,
+    pub(super) limit: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Law {
+pub(super) enum Law {
     Dry(usize),
     Bristle(usize),
     Play(usize),

@@ -7,7 +7,7 @@
 mod actuation;
 mod drive;
 mod friction;
-mod inverse;
+mod jacobian;
 mod state;
 mod step;
 
@@ -20,6 +20,7 @@ use drive::Drive;
 use friction::Row;
 use gapscope_dynamics::{Data, Inertia, Model};
 use glam::DVec3;
+use jacobian::Tangent;
 use nalgebra::DMatrix;
 use step::Scratch;
 
@@ -62,6 +63,7 @@ pub struct Plant {
     /// Parts in which a step is taken: impacts in the play of a gear need shorter ones.
     substeps: usize,
     scratch: Scratch,
+    tangent: Tangent,
 }
 
 /// amplitude · sin(cycles · q + phase) on one joint.
@@ -156,6 +158,7 @@ impl Plant {
             rows: Vec::new(),
             substeps: 1,
             scratch: Scratch::new(n, 0),
+            tangent: Tangent::new(n),
         };
         for (j, joint) in model.joints().iter().enumerate() {
             if joint.damping != 0.0 || joint.friction != 0.0 {

@@ -2,9 +2,8 @@
 
 use super::Plant;
 use super::actuation::Actuation;
-use super::inverse::invert;
 use super::state::State;
-use gapscope_dynamics::StepModel;
+use gapscope_dynamics::{StepModel, invert};
 use nalgebra::DMatrix;
 
 /// Damping that locks a drive while the first step looks for its torque, in units of the joint's inertia over the step.
@@ -59,7 +58,7 @@ impl Scratch {
 impl Plant {
     /// Velocity at the end of a time `h` that begins at (`scratch.q_start`, `scratch.v_start`) in the step from `time`
     /// on, with dynamics evaluated at (`scratch.q`, `scratch.v`); in `scratch.v_end`. `locked` drives turn with their link.
-    fn stage(&mut self, h: f64, time: f64, bristles: &[f64], locked: bool) {
+    pub(super) fn stage(&mut self, h: f64, time: f64, bristles: &[f64], locked: bool) {
         let n = self.model.dof();
         self.contact_torque(time);
         let s = &mut self.scratch;
@@ -151,7 +150,7 @@ impl Plant {
     }
 
     /// Coordinates where the step begins, from the measured state.
-    fn gather(&mut self, q: &[f64], v: &[f64], wind_up: &[f64]) {
+    pub(super) fn gather(&mut self, q: &[f64], v: &[f64], wind_up: &[f64]) {
         let n = q.len();
         let s = &mut self.scratch;
         for j in 0..n {
@@ -274,5 +273,15 @@ impl StepModel for Plant {
     fn step(&mut self, x: &mut [f64], tau: &[f64]) {
         self.scratch.outside.fill(0.0);
         self.advance(x, tau);
+    }
+
+    /// Exact, without allocation, where the plant has no hidden state: through inertias, gravity, springs, ripple, gain,
+    /// saturation and friction, on every smooth piece. It jumps where an effort meets its limit and where a direction
+    /// with dry friction stops, starts or turns; there it is the derivative of the piece that the step is on. With
+    /// hidden state (delay, lag, bristles, drift, contact, drives) central differences, which allocate; time and the
+    /// mark of a state that has been filled then count as given.
+    fn jacobian(&mut self, x: &[f64], tau: &[f64], by_state: &mut DMatrix<f64>, by_torque: &mut DMatrix<f64>) {
+        self.scratch.outside.fill(0.0);
+        self.step_jacobian(x, tau, by_state, by_torque);
     }
 }

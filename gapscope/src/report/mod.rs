@@ -10,6 +10,7 @@ mod format;
 mod heatmap;
 mod joints;
 mod rest;
+mod rollout;
 mod score;
 mod series;
 mod shrink;
@@ -25,10 +26,12 @@ use gapscope_diagnosis::schema::{Diagnosis, Evidence, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 pub use answer::{changed, headline, is_above_floor, largest};
+pub use axis::Axis;
 pub use format::{
     NONE, count, estimate, figure, percent, percent_figure, percent_interval, plain, probability_figure, significant,
     span, with_unit,
 };
+pub use rollout::page as rollout_page;
 pub use score::html as score;
 pub use words::{
     capital, effect, implied_unit, interval, joints as joint_list, motion_unit, outstanding, regime, said_of, verdict,

@@ -1,4 +1,4 @@
-//! `gapscope study`: what residual and pure learning need and where they fail, measured on a simulated 7-joint arm.
+//! What residual and pure learning need and where they fail, measured on a simulated 7-joint arm.
 
 mod arm;
 mod policy;
@@ -6,7 +6,7 @@ mod region;
 mod samples;
 mod structure;
 
-use crate::cli::{Study, Topic};
+use crate::cli::Learning;
 use crate::output;
 use crate::picture::{Series, svg};
 use crate::report::axis::Axis;
@@ -14,6 +14,15 @@ use anyhow::{Result, bail};
 use arm::Budget;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
+
+/// Which study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Topic {
+    Samples,
+    Region,
+    Structure,
+    Policy,
+}
 
 /// What a study found.
 struct Findings {
@@ -45,11 +54,11 @@ struct Picture {
 ///
 /// # Errors
 /// Results that exist or cannot be written, or a setting of zero.
-pub fn run(args: &Study) -> Result<String> {
+pub fn run(topic: Topic, args: &Learning) -> Result<String> {
     if args.steps == 0 || args.repeats == 0 {
         bail!("--steps and --repeats must be at least 1");
     }
-    let name = match args.topic {
+    let name = match topic {
         Topic::Samples => samples::NAME,
         Topic::Region => region::NAME,
         Topic::Structure => structure::NAME,
@@ -69,7 +78,7 @@ pub fn run(args: &Study) -> Result<String> {
         bar.set_style(style);
     }
     let budget = Budget { steps: args.steps, repeats: args.repeats, bar: bar.clone() };
-    let found = match args.topic {
+    let found = match topic {
         Topic::Samples => samples::run(&budget),
         Topic::Region => region::run(&budget),
         Topic::Structure => structure::run(&budget),
@@ -100,7 +109,7 @@ fn csv(found: &Findings) -> String {
     text
 }
 
-fn markdown(found: &Findings, args: &Study) -> String {
+fn markdown(found: &Findings, args: &Learning) -> String {
     let mut text = format!("# {}\n\n{}\n\n![{}]({}.svg)\n\n", found.title, found.method, found.title, found.name);
     let _ = writeln!(text, "| {} |\n|{}", found.head.join(" | "), "---|".repeat(found.head.len()));
     for row in &found.rows {

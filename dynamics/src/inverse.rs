@@ -1,12 +1,15 @@
-//! Inverse of the mass matrix.
+//! Inverse of a mass matrix.
 
 use nalgebra::DMatrix;
 
-/// Inverse of a symmetric positive definite matrix by Cholesky; `matrix` is destroyed. Allocates nothing.
+/// Inverse of a symmetric positive definite matrix (n×n) by Cholesky; `matrix` is destroyed. Allocates nothing.
 ///
 /// A pivot that is not positive (a massless link) is raised to a tiny one: the joint then accelerates without bound in
 /// theory and very fast here, which a rollout shows as an error and not as a crash.
-pub(super) fn invert(matrix: &mut DMatrix<f64>, inverse: &mut DMatrix<f64>) {
+///
+/// # Panics
+/// If `inverse` is not of the shape of `matrix`.
+pub fn invert(matrix: &mut DMatrix<f64>, inverse: &mut DMatrix<f64>) {
     let n = matrix.nrows();
     // L in place of the lower triangle.
     for j in 0..n {
@@ -46,6 +49,7 @@ pub(super) fn invert(matrix: &mut DMatrix<f64>, inverse: &mut DMatrix<f64>) {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use approx::assert_relative_eq;

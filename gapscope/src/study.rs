@@ -1,0 +1,22 @@
+//! `gapscope study`: studies that run by one command each.
+
+mod closed_loop;
+mod learning;
+
+use crate::cli::Study;
+use anyhow::Result;
+use learning::Topic;
+
+/// Runs a study; returns what to print.
+///
+/// # Errors
+/// Results that exist or cannot be written, or a setting that cannot be.
+pub fn run(study: &Study) -> Result<String> {
+    match study {
+        Study::ClosedLoop(args) => closed_loop::run(args),
+        Study::Samples(args) => learning::run(Topic::Samples, args),
+        Study::Region(args) => learning::run(Topic::Region, args),
+        Study::Structure(args) => learning::run(Topic::Structure, args),
+        Study::Policy(args) => learning::run(Topic::Policy, args),
+    }
+}

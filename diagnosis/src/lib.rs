@@ -18,12 +18,15 @@ mod gap;
 mod horizon;
 mod kernel;
 mod problem;
+mod refine;
 mod regimes;
 pub mod schema;
+mod screen;
 mod select;
 mod signals;
 mod verdict;
 
-pub use corrected::{Corrected, CorrectedError, EncoderSide, MODEL_SCHEMA};
+pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};
+pub use gapscope_effects::EncoderSide;
 pub use diagnose::{Outcome, Progress, diagnose};
 pub use evaluate::{Predictions, evaluate};

@@ -1,7 +1,7 @@
 //! Which candidates: best subset by local search on held-out deviance, then pruning by the one-standard-error rule.
 
 use crate::problem::Problem;
-use gapscope_effects::Kind;
+use gapscope_effects::{Candidate, Kind};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -10,7 +10,28 @@ const KIND_COST: f64 = 2.0;
 /// Cost of a coefficient on a further joint of a kind that joints usually share, because their drives are alike.
 const SHARED_COST: f64 = 2.0;
 /// Kinds that joints usually share.
-const SHARED: [Kind; 4] = [Kind::ViscousFriction, Kind::CoulombFriction, Kind::Armature, Kind::TorqueBias];
+const SHARED: [Kind; 9] = [
+    Kind::ViscousFriction,
+    Kind::CoulombFriction,
+    Kind::StribeckFriction,
+    Kind::LoadDependentFriction,
+    Kind::PreslidingFriction,
+    Kind::ThermalDrift,
+    Kind::Armature,
+    Kind::TorqueBias,
+    Kind::TorqueRipple,
+];
+/// Dry friction of a joint is one of these.
+const DRY: [Kind; 4] =
+    [Kind::CoulombFriction, Kind::StribeckFriction, Kind::PreslidingFriction, Kind::ThermalDrift];
+/// A rotor's inertia is part of the last two.
+const DRIVE: [Kind; 3] = [Kind::Armature, Kind::JointElasticity, Kind::Backlash];
+/// Ways in which effort acts late.
+const LATE: [Kind; 2] = [Kind::ActuationDelay, Kind::ActuatorLag];
+/// A spring's rest position is a bias.
+const CONSTANT: [Kind; 2] = [Kind::ParallelSpring, Kind::TorqueBias];
+/// Candidates that a first look sends to be held out, in each direction of the search.
+const SHORTLIST: usize = 12;
 /// Cost of a kind that few robots have: where two kinds explain the same, it is the commoner one, by prior.
 const RARE_COST: f64 = 2.0;
 /// A candidate stays where leaving it out costs more than this many standard errors of the paired difference over blocks.
@@ -146,7 +167,7 @@ pub fn evaluate(problem: &Problem, mut set: Vec<usize>) -> Choice {
         .into_iter()
         .map(|kind| {
             let of_kind = || set.iter().map(|&c| &problem.entries[c]).filter(move |e| e.candidate.kind == kind);
-            let coefficients: usize = of_kind().map(|e| e.rank).sum();
+            let coefficients: usize = of_kind().map(|e| e.rank + usize::from(e.candidate.has_knob())).sum();
             let unit = problem.effective_rows().ln();
             if SHARED.contains(&kind) {
                 (1.0 + KIND_COST) * unit + SHARED_COST * (coefficients - 1) as f64
@@ -159,57 +180,55 @@ pub fn evaluate(problem: &Problem, mut set: Vec<usize>) -> Choice {
     Choice { set, blocks, objective }
 }
 
-/// Neighbours of a set: one candidate more, less or exchanged; a kind on all joints more, less or exchanged.
+/// Neighbours of a set: one candidate more, less or exchanged; a kind on all joints more, less or exchanged. What comes in
+/// is what a first look finds best.
 fn moves(problem: &Problem, set: &[usize], forbidden: &[Kind]) -> Vec<Vec<usize>> {
-    let allowed = |c: usize| !forbidden.contains(&problem.entries[c].candidate.kind);
-    let fits_in = |set: &[usize], c: usize| allowed(c) && !set.iter().any(|&other| excludes(problem, other, c));
-    let count = problem.entries.len();
+    let kind_of = |c: usize| problem.entries[c].candidate.kind;
+    let without = |gone: &dyn Fn(usize) -> bool| -> Vec<usize> { set.iter().copied().filter(|&c| !gone(c)).collect() };
     let mut neighbours = Vec::new();
-    let without = |gone: usize| -> Vec<usize> { set.iter().copied().filter(|&c| c != gone).collect() };
-    let with = |mut base: Vec<usize>, c: usize| {
-        base.push(c);
-        base
+    // Each base with what may come in: `near` holds for candidates that can stand for what has gone.
+    let mut from = |base: Vec<usize>, near: &dyn Fn(usize) -> bool| {
+        let gains = problem.gains(&base);
+        let mut open: Vec<usize> = (0..problem.entries.len())
+            .filter(|&c| gains[c] > 0.0 && !forbidden.contains(&kind_of(c)))
+            .filter(|&c| !base.iter().any(|&other| excludes(problem, other, c)))
+            .collect();
+        open.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]).then(a.cmp(&b)));
+        let mut seen = Vec::new();
+        for &c in open.iter().filter(|&&c| near(c)) {
+            // The best of each kind has its chance, however many better ones of other kinds there are.
+            let of_kind = seen.iter().filter(|k| **k == kind_of(c)).count();
+            if of_kind == 0 || (seen.len() < SHORTLIST && of_kind < 3) {
+                seen.push(kind_of(c));
+                neighbours.push(base.iter().copied().chain([c]).collect());
+            }
+        }
+        let mut kinds: Vec<Kind> = open.iter().map(|&c| kind_of(c)).collect();
+        kinds.sort();
+        kinds.dedup();
+        for kind in kinds {
+            let mut filled = base.clone();
+            for &c in open.iter().filter(|&&c| kind_of(c) == kind) {
+                if !filled.iter().any(|&other| excludes(problem, other, c)) {
+                    filled.push(c);
+                }
+            }
+            if filled.len() > base.len() + 1 {
+                neighbours.push(filled);
+            }
+        }
+        neighbours.push(base);
     };
-    for c in (0..count).filter(|&c| fits_in(set, c)) {
-        neighbours.push(with(set.to_vec(), c));
-    }
+    from(set.to_vec(), &|_| true);
     for &gone in set {
-        let rest = without(gone);
         let joints = &problem.entries[gone].candidate.joints;
-        for c in (0..count).filter(|&c| c != gone && fits_in(&rest, c)) {
+        from(without(&|c| c == gone), &|c| {
             let other = &problem.entries[c].candidate.joints;
-            if other.is_empty() || joints.is_empty() || joints.iter().any(|j| other.contains(j)) {
-                neighbours.push(with(rest.clone(), c));
-            }
-        }
-        neighbours.push(rest);
+            c != gone && (other.is_empty() || joints.is_empty() || joints.iter().any(|j| other.contains(j)))
+        });
     }
-    let fill = |mut base: Vec<usize>, kind: Kind| {
-        for c in 0..count {
-            if problem.entries[c].candidate.kind == kind && fits_in(&base, c) {
-                base.push(c);
-            }
-        }
-        base
-    };
-    let present = kinds(problem, set);
-    let per_joint = [
-        Kind::ViscousFriction,
-        Kind::CoulombFriction,
-        Kind::Armature,
-        Kind::TorqueGainError,
-        Kind::TorqueBias,
-        Kind::ParallelSpring,
-    ];
-    for kind in per_joint {
-        neighbours.push(fill(set.to_vec(), kind));
-    }
-    for &gone in &present {
-        let rest: Vec<usize> = set.iter().copied().filter(|&c| problem.entries[c].candidate.kind != gone).collect();
-        for kind in Kind::LINEAR.into_iter().filter(|&k| k != gone) {
-            neighbours.push(fill(rest.clone(), kind));
-        }
-        neighbours.push(rest);
+    for gone in kinds(problem, set) {
+        from(without(&|c| kind_of(c) == gone), &|c| kind_of(c) != gone);
     }
     neighbours.iter_mut().for_each(|s| s.sort_unstable());
     neighbours.sort();
@@ -218,12 +237,15 @@ fn moves(problem: &Problem, set: &[usize], forbidden: &[Kind]) -> Vec<Vec<usize>
     neighbours
 }
 
-/// Whether two candidates must not stand side by side: the same one, a spring beside a bias (its rest position is one),
-/// or the two signs of a coupling.
+/// Whether two candidates must not stand side by side: two of one kind at the same joints, two accounts of the same force,
+/// or two accounts of where the encoder sits.
 fn excludes(problem: &Problem, a: usize, b: usize) -> bool {
     let (a, b) = (&problem.entries[a].candidate, &problem.entries[b].candidate);
-    let pair = |x, y| (a.kind == x && b.kind == y) || (a.kind == y && b.kind == x);
-    a.joints == b.joints && (a.kind == b.kind || pair(Kind::ParallelSpring, Kind::TorqueBias))
+    let both = |family: &[Kind]| family.contains(&a.kind) && family.contains(&b.kind);
+    let elastic = |c: &Candidate| matches!(c.kind, Kind::JointElasticity | Kind::Backlash);
+    (a.joints == b.joints && (a.kind == b.kind || both(&DRY) || both(&DRIVE) || both(&CONSTANT)))
+        || both(&LATE)
+        || (elastic(a) && elastic(b) && a.side != b.side)
 }
 
 /// Takes away, weakest first, what does not lower the held-out deviance beyond doubt or does not matter.

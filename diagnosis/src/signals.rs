@@ -116,7 +116,17 @@ impl Signals {
 
     /// The motion that signatures read.
     pub fn motion<'a>(&'a self, model: &'a Model, standstill: &'a [f64]) -> Motion<'a> {
-        Motion { model, q: &self.q, v: &self.v, a: &self.a, tau: &self.tau, nominal: &self.nominal, standstill }
+        Motion {
+            model,
+            q: &self.q,
+            v: &self.v,
+            a: &self.a,
+            tau: &self.tau,
+            nominal: &self.nominal,
+            dt: self.dt,
+            start: self.first as f64 * self.raw.dt,
+            standstill,
+        }
     }
 
     /// Copies sample `k` of a joint-major signal.

@@ -20,6 +20,10 @@ pub struct Motion<'a> {
     pub tau: &'a [Vec<f64>],
     /// Torque that this motion takes of the nominal robot, damping and friction of its URDF included, N m or N.
     pub nominal: &'a [Vec<f64>],
+    /// Time from one sample to the next, s.
+    pub dt: f64,
+    /// Time of the first sample since the start of the episode, s.
+    pub start: f64,
     /// Speed per joint below which it counts as standing, rad/s or m/s.
     pub standstill: &'a [f64],
 }

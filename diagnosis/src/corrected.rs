@@ -2,7 +2,7 @@
 
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
-use gapscope_effects::{Effect, EffectError, EncoderSide, Motion, Plant};
+use gapscope_effects::{Effect, EffectError, EncoderSide, ExternalContact, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -135,7 +135,30 @@ pub fn per_joint(model: &Model, map: &BTreeMap<String, f64>) -> Vec<f64> {
 /// # Errors
 /// An effect that the robot cannot have.
 pub fn plant(model: &Model, effects: &[Effect], side: EncoderSide, dt: f64) -> Result<Plant, EffectError> {
-    let plant = Plant::new(model, effects, dt)?;
+    plant_pushed(model, effects, side, dt, &[])
+}
+
+/// The same while something outside pushes, as one log has it: contacts take their times from the log.
+///
+/// # Errors
+/// An effect that the robot cannot have.
+pub fn plant_pushed(
+    model: &Model,
+    effects: &[Effect],
+    side: EncoderSide,
+    dt: f64,
+    pushed: &[[f64; 2]],
+) -> Result<Plant, EffectError> {
+    let here: Vec<Effect> = effects
+        .iter()
+        .map(|effect| match effect {
+            Effect::ExternalContact(contact) => {
+                Effect::ExternalContact(ExternalContact { intervals: pushed.to_vec(), ..contact.clone() })
+            }
+            other => other.clone(),
+        })
+        .collect();
+    let plant = Plant::new(model, &here, dt)?;
     Ok(if side == EncoderSide::Motor { plant.with_motor_encoders() } else { plant })
 }
 

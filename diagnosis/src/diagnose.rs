@@ -1,7 +1,8 @@
 //! The diagnosis: logs and a robot in; where, which and how far out.
 
 use crate::band::Band;
-use crate::corrected::{Corrected, MODEL_SCHEMA, plant, residual};
+use crate::contact;
+use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
 use crate::estimate::Fit;
 use crate::evidence;
 use crate::floor::noise_floor;
@@ -29,6 +30,20 @@ const INDISTINGUISHABLE: f64 = 0.05;
 const MOVING_PART: f64 = 0.05;
 /// ... and its top speed is this many times the speed that counts as standing.
 const MOVING_SPEED: f64 = 8.0;
+/// Kinds that are taken into account while looking for something outside that pushes.
+const COMMON: [Kind; 6] = [
+    Kind::ViscousFriction,
+    Kind::CoulombFriction,
+    Kind::Armature,
+    Kind::TorqueBias,
+    Kind::GravityMisalignment,
+    Kind::Payload,
+];
+/// Time about the edges of a push that counts neither way, s.
+const EDGE: f64 = 0.15;
+/// Power of the explained part of the gap by which confidence falls: what leaves much of the gap may be the nearest thing
+/// that the catalogue has to a cause that it has not.
+const MISFIT: i32 = 2;
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
 
@@ -72,11 +87,12 @@ pub fn diagnose(
         band: band.cutoff,
         findings,
     };
-    let logs = Logs { model, signals, band, still, moving };
+    let mut logs = Logs { model, signals, band, still, moving };
     if !logs.is_excited() {
         return Ok(logs.not_excited(data));
     }
     progress("signatures of every effect", 0.05);
+    logs.look_for_pushes()?;
     let chosen = logs.choose(progress)?;
     progress("rivals", 0.55);
     let rivals = select::rivals(&chosen.all, &chosen.choice);
@@ -130,7 +146,8 @@ struct Chosen {
 
 /// What each joint does in the logs.
 fn ranges(signals: &[Signals], joints: usize) -> Vec<Range> {
-    let quantile = |sorted: &[f64], part: f64| sorted.get((part * sorted.len() as f64) as usize).copied().unwrap_or(0.0);
+    let quantile =
+        |sorted: &[f64], part: f64| sorted.get((part * sorted.len() as f64) as usize).copied().unwrap_or(0.0);
     (0..joints)
         .map(|j| {
             let sorted = |pick: &dyn Fn(&Signals) -> Vec<f64>| {
@@ -178,6 +195,31 @@ struct HeldOut {
 }
 
 impl Logs<'_> {
+    /// Marks the stretches of time that stand out of what the commonest candidates leave.
+    fn look_for_pushes(&mut self) -> Result<(), EffectError> {
+        let n = self.model.dof();
+        let nominal: Vec<Vec<Vec<f64>>> = self
+            .signals
+            .par_iter()
+            .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
+            .collect();
+        let noise = noise_floor(&self.signals, &self.band, &nominal, n);
+        let mut candidates = Candidate::all(self.model);
+        candidates.retain(|c| COMMON.contains(&c.kind));
+        let terms = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
+        let problem = self.data(&noise).problem(terms);
+        let rest = problem.robust_rest(self.band.rows.len());
+        let bare = gap::at_rows(&self.band, &nominal, n);
+        let mut pushed = contact::stretches(&self.signals, &self.band, &bare);
+        if pushed.iter().all(Vec::is_empty) {
+            pushed = contact::stretches(&self.signals, &self.band, &rest);
+        }
+        for (s, pushed) in self.signals.iter_mut().zip(pushed) {
+            s.pushed = pushed;
+        }
+        Ok(())
+    }
+
     fn is_excited(&self) -> bool {
         self.moving.iter().any(|m| *m) && self.band.rows.len() >= verdict::LEAST_ROWS
     }
@@ -218,18 +260,23 @@ impl Logs<'_> {
         let ranges = ranges(&self.signals, self.model.dof());
         candidates.extend(Candidate::knobs(&ranges));
         candidates.extend(screen::ripples(&data, &ranges, &residuals));
+        if self.signals.iter().any(|s| !s.pushed.is_empty()) {
+            candidates.extend(Candidate::contacts(self.model));
+        }
         candidates.retain(|c| !forbidden.contains(&c.kind));
         let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
         let mut all = data.problem(candidates.iter().map(open).collect());
         progress("choosing effects", 0.2);
         let mut choice = select::choose(&all, &[], &[]);
-        for round in 0..ROUNDS {
+        let mut round = 0;
+        loop {
             progress("refining effects", 0.3 + 0.08 * round as f64);
+            round += 1;
             let (exact, fit) = data.refine(&self.candidates(&all, &choice.set))?;
             // The choice again, around the parameters found: knobs turned, and what bends taken into account.
             let changes: Vec<(usize, Candidate)> =
                 choice.set.iter().zip(&exact.entries).map(|(&c, e)| (c, e.candidate.clone())).collect();
-            if round + 1 == ROUNDS || choice.set.is_empty() {
+            if round == ROUNDS || choice.set.is_empty() {
                 return Ok(Chosen { all, choice, exact, fit, noise });
             }
             all.replace(self.model, &self.signals, &self.band, &self.still, &changes);
@@ -246,7 +293,6 @@ impl Logs<'_> {
                 return Ok(Chosen { all, choice, exact, fit, noise });
             }
         }
-        unreachable!("the last round returns")
     }
 
     fn candidates(&self, problem: &Problem, set: &[usize]) -> Vec<Candidate> {
@@ -277,7 +323,7 @@ impl Logs<'_> {
                 if !self.band.rows[range.clone()].iter().any(|r| r.fold == fold) {
                     continue;
                 }
-                let mut plant = plant(self.model, &effects[fold], side, s.dt)?;
+                let mut plant = plant_pushed(self.model, &effects[fold], side, s.dt, &s.pushed)?;
                 let rest = residual(&mut plant, self.model, s, &self.still, fits[fold].alignment());
                 for (row, x) in rows.iter_mut().zip(&rest) {
                     let filtered = self.band.filter(e, x);
@@ -337,7 +383,15 @@ impl Logs<'_> {
         let final_residuals: Vec<Vec<Vec<f64>>> = self
             .signals
             .iter()
-            .map(|s| Ok(residual(&mut plant(model, &effects, side, s.dt)?, model, s, &self.still, fit.alignment())))
+            .map(|s| {
+                Ok(residual(
+                    &mut plant_pushed(model, &effects, side, s.dt, &s.pushed)?,
+                    model,
+                    s,
+                    &self.still,
+                    fit.alignment(),
+                ))
+            })
             .collect::<Result<_, EffectError>>()?;
         let floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof());
         progress("intervals", 0.85);
@@ -346,9 +400,20 @@ impl Logs<'_> {
         let floor_rms = gap::weighted_rms(&floor.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &weights);
         let torque = gap::change(&squares(&before.rows), &squares(&after.rows), &weights, floor_rms);
         let (one_step, rollout) = before.errors.change(&after.errors, &weights);
-        let unexplained = verdict::unexplained_fraction(&torque, floor_rms);
-        let verdict = verdict::verdict(&effects, &torque, floor_rms, unexplained);
-        let found = self.found_effects(chosen, rivals, &torque, &weights)?;
+        // Where a push begins or ends to the hundredth of a second is not what a verdict hangs on.
+        let calm = |i: usize| {
+            let row = &self.band.rows[i];
+            let s = &self.signals[row.episode];
+            let time = s.first as f64 * s.raw.dt + row.center as f64 * s.dt;
+            s.pushed.iter().flatten().all(|edge| (time - edge).abs() > EDGE)
+        };
+        let apart = |rows: &Rows| gap::squares(&self.band, rows, calm);
+        let away = gap::change(&apart(&before.rows), &apart(&after.rows), &weights, floor_rms);
+        let pushes = effects.iter().any(|e| e.kind() == Kind::ExternalContact);
+        let judged = if pushes { &away } else { &torque };
+        let unexplained = verdict::unexplained_fraction(judged, floor_rms);
+        let verdict = verdict::verdict(&effects, judged, floor_rms, unexplained);
+        let found = self.found_effects(chosen, rivals, &torque, unexplained, &weights)?;
         let corrected = Corrected {
             schema: MODEL_SCHEMA.to_owned(),
             robot: model.name().to_owned(),
@@ -357,7 +422,8 @@ impl Logs<'_> {
             band: self.band.cutoff,
             encoder_side: side,
             alignment: fit.alignment(),
-            effects,
+            // A push belongs to its own log.
+            effects: effects.into_iter().filter(|e| e.kind() != Kind::ExternalContact).collect(),
         };
         let gap_of = |held_out: &HeldOut| Gap {
             torque: gap::torque_gap(model, &self.band, &held_out.rows, &floor, everything),
@@ -397,6 +463,7 @@ impl Logs<'_> {
         chosen: &Chosen,
         rivals: &[Rival],
         torque: &Change,
+        unexplained: f64,
         weights: &[f64],
     ) -> Result<Vec<FoundEffect>, EffectError> {
         let (problem, fit) = (&chosen.exact, &chosen.fit);
@@ -422,7 +489,7 @@ impl Logs<'_> {
                 FoundEffect {
                     kind: kind.name().to_owned(),
                     joints: effect.law().joints(),
-                    confidence: 1.0 - rival.map_or(0.0, |r| r.probability),
+                    confidence: (1.0 - rival.map_or(0.0, |r| r.probability)) * (1.0 - unexplained).powi(MISFIT),
                     parameters: fit.parameters(problem, self.model, kind, &own),
                     indistinguishable_from: confused,
                     shrink: EffectShrink { torque: shrink },

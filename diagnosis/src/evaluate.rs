@@ -45,10 +45,7 @@ pub fn evaluate(
     let nominal: Vec<Vec<Vec<f64>>> =
         signals.iter().map(|s| residual(&mut Plant::nominal(model, s.dt), model, s, &still, 0.0)).collect();
     let after: Vec<Vec<Vec<f64>>> = match corrected {
-        Some(c) => signals
-            .iter()
-            .map(|s| c.residual(model, s))
-            .collect::<Result<_, EffectError>>()?,
+        Some(c) => signals.iter().map(|s| c.residual(model, s)).collect::<Result<_, EffectError>>()?,
         None => nominal.clone(),
     };
     let floor = noise_floor(&signals, &band, &after, n);

@@ -8,6 +8,7 @@
 
 mod band;
 mod bootstrap;
+mod contact;
 mod corrected;
 mod diagnose;
 mod estimate;
@@ -27,6 +28,6 @@ mod signals;
 mod verdict;
 
 pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};
-pub use gapscope_effects::EncoderSide;
 pub use diagnose::{Outcome, Progress, diagnose};
 pub use evaluate::{Predictions, evaluate};
+pub use gapscope_effects::EncoderSide;

@@ -11,6 +11,10 @@ use std::ops::Range;
 
 /// Residuals beyond this many standard deviations get less weight (Huber 1964).
 const HUBER: f64 = 3.0;
+/// No law is exact to better than this part of the torque that it explains.
+const INEXACT: f64 = 0.003;
+/// Beyond this multiple of that, the weight falls with the square.
+const FAR: f64 = 2.0;
 /// Errors under this part of a joint's effort are nobody's concern: they are what sampling and integration leave.
 const IMMATERIAL: f64 = 1e-3;
 /// An effect must move some joint by this multiple of the immaterial part of its effort, ...
@@ -72,6 +76,10 @@ impl Term {
                 at_least: -KNOB_CHANGE * self.candidate.shape,
                 at_most: KNOB_CHANGE * self.candidate.shape,
             };
+            if self.candidate.kind == Kind::TorqueSaturation {
+                // A limit cuts all that is beyond it.
+                (columns[0].at_least, columns[0].at_most) = (1.0, 1.0);
+            }
             for ((theta, here), there) in theta.iter().zip(&columns).zip(&moved) {
                 for ((row, here), there) in tangent.rows.iter_mut().zip(&here.rows).zip(&there.rows) {
                     for ((t, h), m) in row.1.iter_mut().zip(&here.1).zip(&there.1) {
@@ -158,6 +166,8 @@ pub struct Problem {
     folds: usize,
     blocks: Vec<Normal>,
     training: Vec<Normal>,
+    /// Of the rows of each fold.
+    held: Vec<Normal>,
     total: Normal,
 }
 
@@ -174,8 +184,7 @@ impl Problem {
         noise: &[f64],
     ) -> Problem {
         let n = model.dof();
-        let terms: Vec<Term> =
-            terms.into_iter().filter(|t| t.candidate.joints.iter().all(|&j| moving[j])).collect();
+        let terms: Vec<Term> = terms.into_iter().filter(|t| t.candidate.joints.iter().all(|&j| moving[j])).collect();
         let half_sample = 0.5 * signals.iter().map(|s| s.raw.dt).fold(f64::INFINITY, f64::min);
         let mut entries = Vec::new();
         let mut bounds = vec![(-half_sample, half_sample)];
@@ -263,6 +272,7 @@ impl Problem {
             folds: band.folds,
             blocks: Vec::new(),
             training: Vec::new(),
+            held: Vec::new(),
             total: Normal::zeros(p),
         };
         problem.weigh(band);
@@ -276,6 +286,22 @@ impl Problem {
             })
             .collect();
         problem
+    }
+
+    /// What a fit of all candidates, deaf to what stands far out, leaves at each row: `[joint][row]`; 0 where a row is out.
+    pub fn robust_rest(&self, rows: usize) -> Vec<Vec<f64>> {
+        let all: Vec<usize> = (0..self.bounds.len()).collect();
+        let theta = self.solve_unbounded(&all, &self.total);
+        self.joints
+            .iter()
+            .map(|joint| {
+                let mut rest = vec![0.0; rows];
+                for (&row, r) in joint.rows.iter().zip(joint.residual(&all, &theta)) {
+                    rest[row] = r;
+                }
+                rest
+            })
+            .collect()
     }
 
     /// Rows that count as independent, all joints together; two at least.
@@ -311,7 +337,7 @@ impl Problem {
         self.sigma = self.scale.clone();
         self.accumulate(band);
         let all: Vec<usize> = (0..self.bounds.len()).collect();
-        for _ in 0..3 {
+        for _ in 0..5 {
             let theta = self.solve_unbounded(&all, &self.total);
             for (j, rows) in self.joints.iter_mut().enumerate() {
                 let rest = rows.residual(&all, &theta);
@@ -324,7 +350,14 @@ impl Problem {
                 let least = IMMATERIAL * self.scale[j];
                 for (weight, r) in rows.robust.iter_mut().zip(&rest) {
                     let z = r.abs() / (HUBER * spread.max(least));
-                    *weight = if z > 1.0 { 1.0 / z } else { 1.0 };
+                    // Huber near, and far out as if the row were not there.
+                    *weight = if z > FAR {
+                        FAR / (z * z)
+                    } else if z > 1.0 {
+                        1.0 / z
+                    } else {
+                        1.0
+                    };
                 }
                 let clipped: Vec<f64> = rest.iter().zip(&rows.robust).map(|(r, w)| r * w).collect();
                 let free = rows.rows.len().saturating_sub(rows.columns.len()).max(1);
@@ -333,6 +366,12 @@ impl Problem {
             }
             self.accumulate(band);
         }
+        for (rows, sigma) in self.joints.iter_mut().zip(&self.sigma) {
+            for (weight, target) in rows.robust.iter_mut().zip(&rows.linear_target) {
+                *weight /= 1.0 + (INEXACT * target / sigma).powi(2);
+            }
+        }
+        self.accumulate(band);
     }
 
     /// Normal equations of every block. Rows are weighted, not whitened: whitening would rest the fit on the fast edges of
@@ -372,26 +411,21 @@ impl Problem {
         for normal in &blocks {
             total.add(normal);
         }
-        self.training = (0..self.folds)
-            .map(|fold| {
-                let mut rest = Normal::zeros(p);
-                for (normal, &of) in blocks.iter().zip(&self.fold_of_block) {
-                    if of != fold {
-                        rest.add(normal);
-                    }
-                }
-                rest
-            })
-            .collect();
+        let fold_of_block = &self.fold_of_block;
+        let sum = |keep: &(dyn Fn(usize) -> bool + Sync)| {
+            let mut sum = Normal::zeros(p);
+            blocks.iter().zip(fold_of_block).filter(|(_, of)| keep(**of)).for_each(|(normal, _)| sum.add(normal));
+            sum
+        };
+        self.training = (0..self.folds).into_par_iter().map(|fold| sum(&|of| of != fold)).collect();
+        self.held = (0..self.folds).into_par_iter().map(|fold| sum(&|of| of == fold)).collect();
         self.blocks = blocks;
         self.total = total;
     }
 
     /// Columns of a set of candidates, the alignment first, unless an effect of the set says how late the effort acts.
     pub fn columns(&self, set: &[usize]) -> Vec<usize> {
-        let late = |&c: &usize| {
-            matches!(self.entries[c].candidate.kind, Kind::ActuationDelay | Kind::ActuatorLag)
-        };
+        let late = |&c: &usize| matches!(self.entries[c].candidate.kind, Kind::ActuationDelay | Kind::ActuatorLag);
         let alignment = (!set.iter().any(late)).then_some(0);
         alignment.into_iter().chain(set.iter().flat_map(|&c| self.entries[c].columns.clone())).collect()
     }
@@ -466,6 +500,12 @@ impl Problem {
             .zip(&self.fold_of_block)
             .map(|(block, &fold)| block.deviance(&columns, &fits[fold]))
             .collect()
+    }
+
+    /// Held-out deviance of all blocks together.
+    pub fn held_out_total(&self, set: &[usize]) -> f64 {
+        let columns = self.columns(set);
+        (0..self.folds).map(|fold| self.held[fold].deviance(&columns, &self.fit_without(&columns, fold))).sum()
     }
 
     /// Covariance of the coefficients by the sandwich over blocks, which allows for any correlation inside a block.
@@ -546,7 +586,11 @@ impl Problem {
                 if k == 1 {
                     let (low, high) = self.bounds[own.start];
                     let step = rest[0] / schur[(0, 0)].max(GAIN_RIDGE * size[0]).max(f64::MIN_POSITIVE);
-                    return if (step < 0.0 && low >= 0.0) || (step > 0.0 && high <= 0.0) { 0.0 } else { step * rest[0] };
+                    return if (step < 0.0 && low >= 0.0) || (step > 0.0 && high <= 0.0) {
+                        0.0
+                    } else {
+                        step * rest[0]
+                    };
                 }
                 (0..k).for_each(|i| schur[(i, i)] += GAIN_RIDGE * size[i] + f64::MIN_POSITIVE.sqrt());
                 schur.cholesky().map_or(0.0, |f| rest.dot(&f.solve(&rest)))
@@ -595,6 +639,9 @@ impl Problem {
             let release = (0..m).filter(|&i| held[i].is_some()).find(|&i| {
                 let gradient: f64 = moment[i] - (0..m).map(|j| gram[(i, j)] * theta[j]).sum::<f64>();
                 let (low, high) = self.bounds[columns[i]];
+                if low == high {
+                    return false;
+                }
                 let tolerance = 1e-9 * (gram[(i, i)] * normal.square).sqrt();
                 (theta[i] <= low && gradient > tolerance) || (theta[i] >= high && gradient < -tolerance)
             });

@@ -2,7 +2,7 @@
 //! coefficients accounted for.
 
 use crate::band::Band;
-use crate::corrected::{plant, residual};
+use crate::corrected::{plant_pushed, residual};
 use crate::estimate::Fit;
 use crate::problem::{Problem, Term};
 use crate::signals::Signals;
@@ -50,7 +50,7 @@ impl Data<'_> {
         self.signals
             .par_iter()
             .map(|s| {
-                let mut with = plant(self.model, &effects, side, s.dt)?;
+                let mut with = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
                 let mut exact = residual(&mut with, self.model, s, self.standstill, 0.0);
                 let mut nominal = Plant::nominal(self.model, s.dt);
                 let nominal = residual(&mut nominal, self.model, s, self.standstill, 0.0);
@@ -78,8 +78,7 @@ impl Data<'_> {
     /// # Errors
     /// An effect that the robot cannot have.
     pub fn refine(&self, candidates: &[Candidate]) -> Result<(Problem, Fit), EffectError> {
-        let mut terms: Vec<Term> =
-            candidates.iter().map(|c| Term { candidate: c.clone(), tangent_at: None }).collect();
+        let mut terms: Vec<Term> = candidates.iter().map(|c| Term { candidate: c.clone(), tangent_at: None }).collect();
         let set: Vec<usize> = (0..terms.len()).collect();
         let mut curvature: Option<Vec<Vec<Vec<f64>>>> = None;
         let mut round = 0;
@@ -105,7 +104,8 @@ impl Data<'_> {
                         term.tangent_at = Some(rest.to_vec());
                         change = change.max((term.candidate.shape / before - 1.0).abs());
                     } else {
-                        term.tangent_at = Some(theta);
+                        let one = term.candidate.kind == Kind::TorqueSaturation;
+                        term.tangent_at = Some(if one { vec![1.0] } else { theta });
                         change = 1.0;
                     }
                 }

@@ -27,9 +27,8 @@ pub fn ripples(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>]) -
                 let span = ranges[j].span.max(1e-9);
                 q.iter().map(|q| 2.0 * q / span).collect::<Vec<f64>>()
             };
-            let mut base: Vec<Vec<f64>> = (0..=POWERS)
-                .map(|power| at_rows(&|e| middle(e).iter().map(|x| x.powi(power)).collect()))
-                .collect();
+            let mut base: Vec<Vec<f64>> =
+                (0..=POWERS).map(|power| at_rows(&|e| middle(e).iter().map(|x| x.powi(power)).collect())).collect();
             base.push(at_rows(&|e| data.signals[e].v[j].clone()));
             base.push(at_rows(&|e| data.signals[e].a[j].clone()));
             base.push(at_rows(&|e| data.signals[e].nominal[j].clone()));

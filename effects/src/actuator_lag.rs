@@ -3,8 +3,8 @@
 //! T u̇ = τ − u, τ_effective = u.
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), chapter 5 (the drive's current loop).
 
-use crate::effect::{Law, Value, check};
 use crate::actuation_delay::changed;
+use crate::effect::{Law, Value, check};
 use crate::filter::first_order;
 use crate::signature::Column;
 use crate::{EffectError, Kind, Motion, Plant};

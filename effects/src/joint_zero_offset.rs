@@ -5,8 +5,8 @@
 
 use crate::effect::{Law, Value, check, per_joint};
 use crate::signature::Column;
-use gapscope_dynamics::Data;
 use crate::{EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Data;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -46,7 +46,7 @@ pub use joint_zero_offset::JointZeroOffset;
 pub use kind::Kind;
 pub use link_inertia_error::LinkInertiaError;
 pub use load_dependent_friction::LoadDependentFriction;
-pub use motion::{Motion, soft_sign};
+pub use motion::{Held, Motion, soft_sign};
 pub use parallel_spring::ParallelSpring;
 pub use payload::Payload;
 pub use plant::Plant;

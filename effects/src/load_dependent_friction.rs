@@ -4,8 +4,8 @@
 //! Source: Hamon, Gautier, Garrec, IEEE/RSJ IROS 2010 (dry friction that depends on load and velocity).
 
 use crate::effect::{Law, Value, check, per_joint};
-use crate::signature::Column;
 use crate::motion::soft_sign;
+use crate::signature::Column;
 use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

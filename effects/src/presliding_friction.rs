@@ -6,8 +6,8 @@
 
 use crate::effect::{Law, Value, check, per_joint, value_at};
 use crate::filter::bristle;
-use crate::signature::Column;
 use crate::plant::Bristle;
+use crate::signature::Column;
 use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

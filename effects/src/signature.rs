@@ -4,13 +4,13 @@
 //! the φ_i are its signature.
 
 use crate::{
-    ActuationDelay, ActuatorLag, Armature, Backlash, CoulombFriction, Effect, JointCoupling, JointElasticity,
-    JointZeroOffset, Kind, LoadDependentFriction, Motion, ParallelSpring, PreslidingFriction, StribeckFriction,
-    ThermalDrift, TorqueBias, TorqueGainError, TorqueRipple, TorqueSaturation, ViscousFriction, actuation_delay,
-    actuator_lag, armature, backlash, coulomb_friction, gravity_misalignment, joint_coupling, joint_elasticity,
-    joint_zero_offset, link_inertia_error, load_dependent_friction, parallel_spring, payload, presliding_friction,
-    stribeck_friction, thermal_drift, torque_bias, torque_gain_error, torque_ripple, torque_saturation,
-    viscous_friction,
+    ActuationDelay, ActuatorLag, Armature, Backlash, CoulombFriction, Effect, ExternalContact, JointCoupling,
+    JointElasticity, JointZeroOffset, Kind, LoadDependentFriction, Motion, ParallelSpring, PreslidingFriction,
+    StribeckFriction, ThermalDrift, TorqueBias, TorqueGainError, TorqueRipple, TorqueSaturation, ViscousFriction,
+    actuation_delay, actuator_lag, armature, backlash, coulomb_friction, external_contact, gravity_misalignment,
+    joint_coupling, joint_elasticity, joint_zero_offset, link_inertia_error, load_dependent_friction, parallel_spring,
+    payload, presliding_friction, stribeck_friction, thermal_drift, torque_bias, torque_gain_error, torque_ripple,
+    torque_saturation, viscous_friction,
 };
 use gapscope_dynamics::{JointKind, Model};
 use serde::{Deserialize, Serialize};
@@ -67,14 +67,14 @@ pub struct Range {
     /// From its least to its greatest position, rad (m).
     pub span: f64,
     /// Quantiles of the size of its effort at [`Range::QUANTILES`], N m (N).
-    pub effort: [f64; 6],
+    pub effort: [f64; 8],
     /// Length of the longest episode, s.
     pub duration: f64,
 }
 
 impl Range {
     /// Parts of the samples whose effort stays below [`Range::effort`].
-    pub const QUANTILES: [f64; 6] = [0.5, 0.65, 0.75, 0.85, 0.92, 0.97];
+    pub const QUANTILES: [f64; 8] = [0.2, 0.35, 0.5, 0.62, 0.74, 0.85, 0.92, 0.97];
 }
 
 /// Stribeck velocities over the joint's top speed.
@@ -113,9 +113,10 @@ impl Candidate {
         }
         let is_leaf = |j: &usize| model.joints().iter().all(|child| child.parent != Some(*j));
         // A leaf's own error and a payload on it are the same ten numbers: told as a payload, by prior.
-        all.extend((0..model.dof()).map(|j| {
-            Candidate::new(if is_leaf(&j) { Kind::Payload } else { Kind::LinkInertiaError }, vec![j])
-        }));
+        all.extend(
+            (0..model.dof())
+                .map(|j| Candidate::new(if is_leaf(&j) { Kind::Payload } else { Kind::LinkInertiaError }, vec![j])),
+        );
         all.push(Candidate::new(Kind::GravityMisalignment, vec![]));
         for (b, joint) in model.joints().iter().enumerate() {
             let Some(a) = joint.parent else { continue };
@@ -175,6 +176,12 @@ impl Candidate {
         )
     }
 
+    /// A push on each leaf, for motions that know when something pushed.
+    pub fn contacts(model: &Model) -> Vec<Candidate> {
+        let is_leaf = |j: &usize| model.joints().iter().all(|child| child.parent != Some(*j));
+        (0..model.dof()).filter(is_leaf).map(|j| Candidate::new(Kind::ExternalContact, vec![j])).collect()
+    }
+
     /// The signature on a motion.
     pub fn columns(&self, motion: &Motion) -> Vec<Column> {
         match (self.kind, self.joints.as_slice()) {
@@ -196,6 +203,7 @@ impl Candidate {
             (Kind::Payload | Kind::LinkInertiaError, &[j]) => payload::signature(motion, j),
             (Kind::JointCoupling, &[a, b]) => joint_coupling::signature(motion, [a, b], self.shape),
             (Kind::GravityMisalignment, _) => gravity_misalignment::signature(motion),
+            (Kind::ExternalContact, &[j]) => external_contact::signature(motion, j),
             (Kind::ActuationDelay, _) => actuation_delay::signature(motion, self.shape),
             (Kind::ActuatorLag, _) => actuator_lag::signature(motion, self.shape),
             _ => Vec::new(),
@@ -256,6 +264,11 @@ impl Candidate {
                 }
                 return vec![Effect::Backlash(Backlash { gap: single(gap) }), rotor(inertia)];
             }
+            (Kind::ExternalContact, &[x, y, z]) => Effect::ExternalContact(ExternalContact {
+                link: self.joints.first().map(|&j| name(j)).unwrap_or_default(),
+                intervals: Vec::new(),
+                force: [x, y, z],
+            }),
             (Kind::ActuationDelay, &[delay]) => Effect::ActuationDelay(ActuationDelay { delay }),
             (Kind::ActuatorLag, &[time_constant]) => Effect::ActuatorLag(ActuatorLag { time_constant }),
             (Kind::Payload, c) => {

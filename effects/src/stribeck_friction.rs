@@ -4,8 +4,8 @@
 //! Source: Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7) 1994, section 2 (Stribeck curve; here with exponent 2).
 
 use crate::effect::{Law, Value, check, per_joint, value_at};
-use crate::signature::Column;
 use crate::motion::soft_sign;
+use crate::signature::Column;
 use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

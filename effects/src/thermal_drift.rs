@@ -5,8 +5,8 @@
 //! exponential is that of a drive that warms up as one heat capacity.
 
 use crate::effect::{Law, Value, check, per_joint, value_at};
-use crate::signature::Column;
 use crate::motion::soft_sign;
+use crate::signature::Column;
 use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

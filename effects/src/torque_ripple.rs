@@ -4,8 +4,8 @@
 //! Source: Holtz, Springob, IEEE Trans. Industrial Electronics 43(2) 1996 (position-periodic torque harmonics).
 
 use crate::effect::{Law, Value, check, per_joint, value_at};
-use crate::signature::Column;
 use crate::plant::Ripple;
+use crate::signature::Column;
 use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -45,6 +45,6 @@ const COEFFICIENT: (f64, f64) = (0.5, 1.5);
 
 /// One column at a limit: the effort beyond it. Coefficient: one.
 pub(crate) fn signature(motion: &Motion, joint: usize, limit: f64) -> Vec<Column> {
-    let beyond = motion.tau[joint].iter().map(|t| t - t.clamp(-limit, limit)).collect();
+    let beyond = motion.cut(joint, 1.0, 0.0, limit).iter().map(|x| -x).collect();
     vec![Column { at_most: COEFFICIENT.1, ..Column::on(joint, beyond, COEFFICIENT.0) }]
 }

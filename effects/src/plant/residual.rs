@@ -56,7 +56,15 @@ impl Plant {
         let tau: Vec<Vec<f64>> = motion
             .tau
             .iter()
-            .map(|x| first_order(&late(x, self.actuation.delay, motion.dt), self.actuation.lag, motion.dt))
+            .enumerate()
+            .map(|(j, x)| {
+                let (gain, bias, limit) = (self.actuation.gain[j], self.actuation.bias[j], self.actuation.limit[j]);
+                let mut x = x.clone();
+                if limit.is_finite() {
+                    x.iter_mut().zip(motion.cut(j, gain, bias, limit)).for_each(|(x, cut)| *x += cut / gain);
+                }
+                first_order(&late(&x, self.actuation.delay, motion.dt), self.actuation.lag, motion.dt)
+            })
             .collect();
         let bristles: Vec<Vec<f64>> =
             self.bristles.iter().map(|b| bristle(&motion.v[b.joint], b.stiffness / b.coulomb, motion.dt)).collect();

@@ -39,7 +39,9 @@ const COMMON: [Kind; 6] = [
     Kind::GravityMisalignment,
     Kind::Payload,
 ];
-/// Time about the edges of a push that counts neither way, s.
+/// A torque this many times its noise is no artefact of it.
+const CLEAR: f64 = 12.0;
+/// Time about a push that counts neither way, s.
 const EDGE: f64 = 0.15;
 /// Power of the explained part of the gap by which confidence falls: what leaves much of the gap may be the nearest thing
 /// that the catalogue has to a cause that it has not.
@@ -157,11 +159,11 @@ fn ranges(signals: &[Signals], joints: usize) -> Vec<Range> {
             };
             let speed = sorted(&|s| s.v[j].iter().map(|v| v.abs()).collect());
             let place = sorted(&|s| s.q[j].clone());
-            let effort = sorted(&|s| s.tau[j].iter().map(|t| t.abs()).collect());
+            let torque = sorted(&|s| s.nominal[j].iter().map(|t| t.abs()).collect());
             Range {
                 speed: quantile(&speed, 0.98),
                 span: place.last().zip(place.first()).map_or(0.0, |(last, first)| last - first),
-                effort: Range::QUANTILES.map(|part| quantile(&effort, part)),
+                torque: quantile(&torque, 0.995),
                 duration: signals.iter().map(|s| s.len() as f64 * s.dt).fold(0.0, f64::max),
             }
         })
@@ -257,7 +259,13 @@ impl Logs<'_> {
         let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof());
         let data = self.data(&noise);
         let mut candidates = Candidate::all(self.model);
-        let ranges = ranges(&self.signals, self.model.dof());
+        let mut ranges = ranges(&self.signals, self.model.dof());
+        for (range, noise) in ranges.iter_mut().zip(&noise) {
+            // A cut of an effort that is mostly noise would explain that noise by itself.
+            if range.torque < CLEAR * noise {
+                range.torque = 0.0;
+            }
+        }
         candidates.extend(Candidate::knobs(&ranges));
         candidates.extend(screen::ripples(&data, &ranges, &residuals));
         if self.signals.iter().any(|s| !s.pushed.is_empty()) {
@@ -400,12 +408,12 @@ impl Logs<'_> {
         let floor_rms = gap::weighted_rms(&floor.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &weights);
         let torque = gap::change(&squares(&before.rows), &squares(&after.rows), &weights, floor_rms);
         let (one_step, rollout) = before.errors.change(&after.errors, &weights);
-        // Where a push begins or ends to the hundredth of a second is not what a verdict hangs on.
+        // No hand pushes twice alike: what is left while nothing pushes is what a verdict hangs on.
         let calm = |i: usize| {
             let row = &self.band.rows[i];
             let s = &self.signals[row.episode];
             let time = s.first as f64 * s.raw.dt + row.center as f64 * s.dt;
-            s.pushed.iter().flatten().all(|edge| (time - edge).abs() > EDGE)
+            s.pushed.iter().all(|[from, to]| time < from - EDGE || time > to + EDGE)
         };
         let apart = |rows: &Rows| gap::squares(&self.band, rows, calm);
         let away = gap::change(&apart(&before.rows), &apart(&after.rows), &weights, floor_rms);
@@ -413,7 +421,8 @@ impl Logs<'_> {
         let judged = if pushes { &away } else { &torque };
         let unexplained = verdict::unexplained_fraction(judged, floor_rms);
         let verdict = verdict::verdict(&effects, judged, floor_rms, unexplained);
-        let found = self.found_effects(chosen, rivals, &torque, unexplained, &weights)?;
+        let misfit = if verdict == Verdict::Explained { 0.0 } else { unexplained };
+        let found = self.found_effects(chosen, rivals, &torque, misfit, &weights)?;
         let corrected = Corrected {
             schema: MODEL_SCHEMA.to_owned(),
             robot: model.name().to_owned(),
@@ -463,7 +472,7 @@ impl Logs<'_> {
         chosen: &Chosen,
         rivals: &[Rival],
         torque: &Change,
-        unexplained: f64,
+        misfit: f64,
         weights: &[f64],
     ) -> Result<Vec<FoundEffect>, EffectError> {
         let (problem, fit) = (&chosen.exact, &chosen.fit);
@@ -489,7 +498,7 @@ impl Logs<'_> {
                 FoundEffect {
                     kind: kind.name().to_owned(),
                     joints: effect.law().joints(),
-                    confidence: (1.0 - rival.map_or(0.0, |r| r.probability)) * (1.0 - unexplained).powi(MISFIT),
+                    confidence: (1.0 - rival.map_or(0.0, |r| r.probability)) * (1.0 - misfit).powi(MISFIT),
                     parameters: fit.parameters(problem, self.model, kind, &own),
                     indistinguishable_from: confused,
                     shrink: EffectShrink { torque: shrink },

@@ -66,15 +66,10 @@ pub struct Range {
     pub speed: f64,
     /// From its least to its greatest position, rad (m).
     pub span: f64,
-    /// Quantiles of the size of its effort at [`Range::QUANTILES`], N m (N).
-    pub effort: [f64; 8],
+    /// Torque that its motion hardly ever takes more of, by the nominal model, N m (N).
+    pub torque: f64,
     /// Length of the longest episode, s.
     pub duration: f64,
-}
-
-impl Range {
-    /// Parts of the samples whose effort stays below [`Range::effort`].
-    pub const QUANTILES: [f64; 8] = [0.2, 0.35, 0.5, 0.62, 0.74, 0.85, 0.92, 0.97];
 }
 
 /// Stribeck velocities over the joint's top speed.
@@ -83,6 +78,8 @@ const STRIBECK: [f64; 5] = [0.03, 0.06, 0.12, 0.25, 0.5];
 const BRISTLE: [f64; 5] = [0.0015, 0.005, 0.015, 0.05, 0.15];
 /// Time constants of a drift over the longest episode.
 const DRIFT: [f64; 5] = [0.06, 0.15, 0.35, 0.8, 2.0];
+/// Limits over the torque that the motion takes at most: a limit that is reached is delivered, and no more than it.
+const LIMIT: [f64; 9] = [0.75, 0.85, 0.92, 0.97, 1.0, 1.04, 1.1, 1.2, 1.4];
 /// Delays and lags, s.
 const LATE: [f64; 4] = [0.002, 0.006, 0.012, 0.025];
 /// Cycles of a ripple: at least one and a half over the span; above that by this part of what the span resolves.
@@ -144,7 +141,7 @@ impl Candidate {
             per_joint(Kind::StribeckFriction, j, STRIBECK.map(|part| part * range.speed).to_vec());
             per_joint(Kind::PreslidingFriction, j, BRISTLE.map(|part| 1.0 / (part * range.span)).to_vec());
             per_joint(Kind::ThermalDrift, j, DRIFT.map(|part| part * range.duration).to_vec());
-            per_joint(Kind::TorqueSaturation, j, range.effort.to_vec());
+            per_joint(Kind::TorqueSaturation, j, LIMIT.map(|part| part * range.torque).to_vec());
         }
         for kind in [Kind::ActuationDelay, Kind::ActuatorLag] {
             all.extend(LATE.map(|shape| Candidate { shape, ..Candidate::new(kind, vec![]) }));

@@ -2,7 +2,7 @@
 
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
-use gapscope_effects::{Effect, EffectError, Plant};
+use gapscope_effects::{Effect, EffectError, EncoderSide, ExternalContact, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -29,16 +29,6 @@ pub struct Corrected {
     pub alignment: f64,
     /// The effects.
     pub effects: Vec<Effect>,
-}
-
-/// Side of the transmission at which position is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EncoderSide {
-    /// The logged position is the link's.
-    Link,
-    /// The logged position is the motor's.
-    Motor,
 }
 
 /// Why a corrected model cannot be used.
@@ -117,13 +107,21 @@ impl Corrected {
         Ok(corrected)
     }
 
+    /// The robot with the corrections; `dt` is the length of a step in s.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn plant(&self, model: &Model, dt: f64) -> Result<Plant, EffectError> {
+        plant(model, &self.effects, self.encoder_side, dt)
+    }
+
     /// Residual torque of a measured motion with the corrections, joint-major like the signals; N m or N.
     ///
     /// # Errors
     /// An effect that the robot cannot have.
     pub fn residual(&self, model: &Model, signals: &Signals) -> Result<Vec<Vec<f64>>, EffectError> {
         let standstill = per_joint(model, &self.standstill);
-        Ok(residual(&mut Plant::new(model, &self.effects, signals.dt)?, signals, &standstill, self.alignment))
+        Ok(residual(&mut self.plant(model, signals.dt)?, model, signals, &standstill, self.alignment))
     }
 }
 
@@ -132,22 +130,52 @@ pub fn per_joint(model: &Model, map: &BTreeMap<String, f64>) -> Vec<f64> {
     model.joints().iter().map(|j| map.get(&j.name).copied().unwrap_or(0.0)).collect()
 }
 
-/// Residual torque of a measured motion on a plant, joint-major like the signals; N m or N.
-pub fn residual(plant: &mut Plant, signals: &Signals, standstill: &[f64], alignment: f64) -> Vec<Vec<f64>> {
-    let n = standstill.len();
-    let mut out = vec![Vec::with_capacity(signals.len()); n];
-    let [mut q, mut v, mut a, mut tau, mut rest] = std::array::from_fn(|_| vec![0.0; n]);
-    for k in 0..signals.len() {
-        Signals::gather(&signals.q, k, &mut q);
-        Signals::gather(&signals.v, k, &mut v);
-        Signals::gather(&signals.a, k, &mut a);
-        for j in 0..n {
-            tau[j] = signals.tau[j][k] - alignment * signals.tau_rate[j][k];
-        }
-        plant.residual(&q, &v, &a, &tau, standstill, &mut rest);
-        for (row, &rest) in out.iter_mut().zip(&rest) {
-            row.push(rest);
-        }
+/// A robot with effects whose log shows positions on a side of its transmissions.
+///
+/// # Errors
+/// An effect that the robot cannot have.
+pub fn plant(model: &Model, effects: &[Effect], side: EncoderSide, dt: f64) -> Result<Plant, EffectError> {
+    plant_pushed(model, effects, side, dt, &[])
+}
+
+/// The same while something outside pushes, as one log has it: contacts take their times from the log.
+///
+/// # Errors
+/// An effect that the robot cannot have.
+pub fn plant_pushed(
+    model: &Model,
+    effects: &[Effect],
+    side: EncoderSide,
+    dt: f64,
+    pushed: &[[f64; 2]],
+) -> Result<Plant, EffectError> {
+    let here: Vec<Effect> = effects
+        .iter()
+        .map(|effect| match effect {
+            Effect::ExternalContact(contact) => {
+                Effect::ExternalContact(ExternalContact { intervals: pushed.to_vec(), ..contact.clone() })
+            }
+            other => other.clone(),
+        })
+        .collect();
+    let plant = Plant::new(model, &here, dt)?;
+    Ok(if side == EncoderSide::Motor { plant.with_motor_encoders() } else { plant })
+}
+
+/// Residual torque of a measured motion on a plant of a model, joint-major like the signals; N m or N.
+pub fn residual(
+    plant: &mut Plant,
+    model: &Model,
+    signals: &Signals,
+    standstill: &[f64],
+    alignment: f64,
+) -> Vec<Vec<f64>> {
+    let motion = signals.motion(model, standstill);
+    if alignment == 0.0 {
+        return plant.residuals(&motion);
     }
-    out
+    let shift = |(tau, rate): (&f64, &f64)| tau - alignment * rate;
+    let tau: Vec<Vec<f64>> =
+        signals.tau.iter().zip(&signals.tau_rate).map(|(t, r)| t.iter().zip(r).map(shift).collect()).collect();
+    plant.residuals(&Motion { tau: &tau, ..motion })
 }

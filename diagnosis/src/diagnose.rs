@@ -1,21 +1,24 @@
 //! The diagnosis: logs and a robot in; where, which and how far out.
 
 use crate::band::Band;
-use crate::corrected::{Corrected, EncoderSide, MODEL_SCHEMA, residual};
+use crate::contact;
+use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
 use crate::estimate::Fit;
 use crate::evidence;
 use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
 use crate::horizon::{self, Errors};
-use crate::problem::Problem;
+use crate::problem::{Problem, Term};
+use crate::refine::Data;
 use crate::regimes::regimes;
 use crate::schema::*;
+use crate::screen;
 use crate::select::{self, Choice, Rival};
 use crate::signals::{Signals, standstill};
 use crate::verdict;
 use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
-use gapscope_effects::{Candidate, Effect, EffectError, Kind, Plant};
+use gapscope_effects::{Candidate, Effect, EffectError, EncoderSide, Kind, Plant, Range};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -27,10 +30,24 @@ const INDISTINGUISHABLE: f64 = 0.05;
 const MOVING_PART: f64 = 0.05;
 /// ... and its top speed is this many times the speed that counts as standing.
 const MOVING_SPEED: f64 = 8.0;
-/// Rounds of linearisation for effects whose torque is not linear in their parameters.
-const ROUNDS: usize = 5;
-/// Those effects: their torque bends with their own parameters or with those of others.
-const BENT: [Kind; 3] = [Kind::Payload, Kind::GravityMisalignment, Kind::TorqueGainError];
+/// Kinds that are taken into account while looking for something outside that pushes.
+const COMMON: [Kind; 6] = [
+    Kind::ViscousFriction,
+    Kind::CoulombFriction,
+    Kind::Armature,
+    Kind::TorqueBias,
+    Kind::GravityMisalignment,
+    Kind::Payload,
+];
+/// A torque this many times its noise is no artefact of it.
+const CLEAR: f64 = 12.0;
+/// Time about a push that counts neither way, s.
+const EDGE: f64 = 0.15;
+/// Power of the explained part of the gap by which confidence falls: what leaves much of the gap may be the nearest thing
+/// that the catalogue has to a cause that it has not.
+const MISFIT: i32 = 2;
+/// Times that the choice is made, each around the exact parameters of the one before.
+const ROUNDS: usize = 4;
 
 /// Everything a diagnosis gives.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,15 +89,16 @@ pub fn diagnose(
         band: band.cutoff,
         findings,
     };
-    let logs = Logs { model, signals, band, still, moving };
+    let mut logs = Logs { model, signals, band, still, moving };
     if !logs.is_excited() {
         return Ok(logs.not_excited(data));
     }
     progress("signatures of every effect", 0.05);
-    let (problem, choice) = logs.choose(progress)?;
+    logs.look_for_pushes()?;
+    let chosen = logs.choose(progress)?;
     progress("rivals", 0.55);
-    let rivals = select::rivals(&problem, &choice);
-    logs.conclude(&problem, &choice, &rivals, data, progress)
+    let rivals = select::rivals(&chosen.all, &chosen.choice);
+    logs.conclude(&chosen, &rivals, data, progress)
 }
 
 /// Signals of every episode that is long enough.
@@ -114,6 +132,55 @@ fn moving(signals: &[Signals], still: &[f64], model: &Model, findings: &mut Vec<
         .collect()
 }
 
+/// What the search came to.
+struct Chosen {
+    /// Every candidate, around the parameters found.
+    all: Problem,
+    /// The set chosen from them.
+    choice: Choice,
+    /// The candidates of that set alone, at their exact parameters.
+    exact: Problem,
+    /// Their fit.
+    fit: Fit,
+    /// Noise floor of each joint.
+    noise: Vec<f64>,
+}
+
+/// What each joint does in the logs.
+fn ranges(signals: &[Signals], joints: usize) -> Vec<Range> {
+    let quantile =
+        |sorted: &[f64], part: f64| sorted.get((part * sorted.len() as f64) as usize).copied().unwrap_or(0.0);
+    (0..joints)
+        .map(|j| {
+            let sorted = |pick: &dyn Fn(&Signals) -> Vec<f64>| {
+                let mut all: Vec<f64> = signals.iter().flat_map(pick).collect();
+                all.sort_by(f64::total_cmp);
+                all
+            };
+            let speed = sorted(&|s| s.v[j].iter().map(|v| v.abs()).collect());
+            let place = sorted(&|s| s.q[j].clone());
+            let torque = sorted(&|s| s.nominal[j].iter().map(|t| t.abs()).collect());
+            Range {
+                speed: quantile(&speed, 0.98),
+                span: place.last().zip(place.first()).map_or(0.0, |(last, first)| last - first),
+                torque: quantile(&torque, 0.995),
+                duration: signals.iter().map(|s| s.len() as f64 * s.dt).fold(0.0, f64::max),
+            }
+        })
+        .collect()
+}
+
+/// Puts the coefficients of a fit with tangents on the same candidates without them.
+fn carry(from: &Fit, with: &Problem, to: &Problem, fit: &mut Fit) {
+    for c in 0..to.entries.len() {
+        let (_, theta) = from.own(with, c);
+        let (at, _) = fit.own(to, c);
+        for (at, theta) in at.into_iter().zip(theta) {
+            fit.theta[at] = theta;
+        }
+    }
+}
+
 /// What is being compared.
 struct Logs<'a> {
     model: &'a Model,
@@ -130,93 +197,132 @@ struct HeldOut {
 }
 
 impl Logs<'_> {
+    /// Marks the stretches of time that stand out of what the commonest candidates leave.
+    fn look_for_pushes(&mut self) -> Result<(), EffectError> {
+        let n = self.model.dof();
+        let nominal: Vec<Vec<Vec<f64>>> = self
+            .signals
+            .par_iter()
+            .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
+            .collect();
+        let noise = noise_floor(&self.signals, &self.band, &nominal, n);
+        let mut candidates = Candidate::all(self.model);
+        candidates.retain(|c| COMMON.contains(&c.kind));
+        let terms = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
+        let problem = self.data(&noise).problem(terms);
+        let rest = problem.robust_rest(self.band.rows.len());
+        let bare = gap::at_rows(&self.band, &nominal, n);
+        let mut pushed = contact::stretches(&self.signals, &self.band, &bare);
+        if pushed.iter().all(Vec::is_empty) {
+            pushed = contact::stretches(&self.signals, &self.band, &rest);
+        }
+        for (s, pushed) in self.signals.iter_mut().zip(pushed) {
+            s.pushed = pushed;
+        }
+        Ok(())
+    }
+
     fn is_excited(&self) -> bool {
         self.moving.iter().any(|m| *m) && self.band.rows.len() >= verdict::LEAST_ROWS
     }
 
-    /// The problem and the set of candidates chosen; again with the curvature of effects whose torque is not linear.
+    /// The problem of all candidates, the set chosen from it, and the problem of that set alone at its exact parameters.
     ///
     /// What the normal equations promise is held against the torque that the plant really predicts on held-out data: a set
     /// that makes the gap larger there is no explanation, and the next choice does without the kinds that bend.
-    fn choose(&self, progress: Progress<'_>) -> Result<(Problem, Choice), EffectError> {
+    fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let weights = gap::weights(&self.signals, &self.moving);
         let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, |_| true)), &weights);
         let before = rms(&self.nominal_rows());
         let mut forbidden: &[Kind] = &[];
         loop {
-            let (problem, choice) = self.choose_without(forbidden, progress)?;
-            if choice.set.is_empty() || rms(&self.held_out(&problem, &choice.set, false)?.rows) < before {
-                return Ok((problem, choice));
+            let chosen = self.choose_without(forbidden, progress)?;
+            let set = &chosen.fit.set;
+            if set.is_empty() || rms(&self.held_out(&chosen.exact, set, false)?.rows) < before {
+                return Ok(chosen);
             }
             if !forbidden.is_empty() {
-                let none = select::evaluate(&problem, Vec::new());
-                return Ok((problem, none));
+                let choice = select::evaluate(&chosen.all, Vec::new());
+                let (exact, fit) = self.data(&chosen.noise).refine(&[])?;
+                return Ok(Chosen { choice, exact, fit, ..chosen });
             }
             forbidden = &INERTIAL;
         }
     }
 
-    fn choose_without(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<(Problem, Choice), EffectError> {
-        let mut candidates = Candidate::all(self.model);
-        candidates.retain(|c| !forbidden.contains(&c.kind));
-        let residuals: Vec<Vec<Vec<f64>>> =
-            self.signals.iter().map(|s| residual(&mut Plant::nominal(self.model, s.dt), s, &self.still, 0.0)).collect();
+    fn choose_without(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let residuals: Vec<Vec<Vec<f64>>> = self
+            .signals
+            .par_iter()
+            .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
+            .collect();
         let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof());
-        let mut problem =
-            Problem::new(self.model, &self.signals, &self.band, &self.still, &self.moving, candidates, &noise);
-        progress("choosing effects", 0.2);
-        let mut choice = select::choose(&problem, &[], &[]);
-        for round in 0..ROUNDS {
-            if !select::kinds(&problem, &choice.set).iter().any(|k| BENT.contains(k)) {
-                break;
+        let data = self.data(&noise);
+        let mut candidates = Candidate::all(self.model);
+        let mut ranges = ranges(&self.signals, self.model.dof());
+        for (range, noise) in ranges.iter_mut().zip(&noise) {
+            // A cut of an effort that is mostly noise would explain that noise by itself.
+            if range.torque < CLEAR * noise {
+                range.torque = 0.0;
             }
-            progress("refining effects", 0.4 + 0.03 * round as f64);
-            let curvature = self.curvature(&problem, &Fit::on_all(&problem, &choice.set))?;
-            problem.bend(&self.signals, &self.band, &self.still, &curvature);
-            // The first rounds may still change the choice; the later ones only settle its parameters.
-            choice = if round < 2 {
-                select::choose(&problem, &choice.set, &[])
-            } else {
-                select::evaluate(&problem, choice.set)
-            };
         }
-        Ok((problem, choice))
+        candidates.extend(Candidate::knobs(&ranges));
+        candidates.extend(screen::ripples(&data, &ranges, &residuals));
+        if self.signals.iter().any(|s| !s.pushed.is_empty()) {
+            candidates.extend(Candidate::contacts(self.model));
+        }
+        candidates.retain(|c| !forbidden.contains(&c.kind));
+        let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
+        let mut all = data.problem(candidates.iter().map(open).collect());
+        progress("choosing effects", 0.2);
+        let mut choice = select::choose(&all, &[], &[]);
+        let mut round = 0;
+        loop {
+            progress("refining effects", 0.3 + 0.08 * round as f64);
+            round += 1;
+            let (exact, fit) = data.refine(&self.candidates(&all, &choice.set))?;
+            // The choice again, around the parameters found: knobs turned, and what bends taken into account.
+            let changes: Vec<(usize, Candidate)> =
+                choice.set.iter().zip(&exact.entries).map(|(&c, e)| (c, e.candidate.clone())).collect();
+            if round == ROUNDS || choice.set.is_empty() {
+                return Ok(Chosen { all, choice, exact, fit, noise });
+            }
+            all.replace(self.model, &self.signals, &self.band, &self.still, &changes);
+            let at: Vec<usize> = (0..exact.entries.len()).collect();
+            let plain = data.problem(exact.entries.iter().map(|e| open(&e.candidate)).collect());
+            let mut plain_fit = Fit::on_all(&plain, &at);
+            carry(&fit, &exact, &plain, &mut plain_fit);
+            let curvature = data.curvature(&plain, &plain_fit)?;
+            all.bend(&self.signals, &self.band, &self.still, &curvature);
+            let again = select::choose(&all, &choice.set, &[]);
+            let same = again.set == choice.set;
+            choice = again;
+            if same {
+                return Ok(Chosen { all, choice, exact, fit, noise });
+            }
+        }
     }
 
-    /// What the effects of a fit add to the residual beyond their linear signature: `[episode][joint][signal]`.
-    fn curvature(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
-        let effects = fit.effects(problem, self.model);
-        self.signals
-            .iter()
-            .map(|s| {
-                let mut exact = residual(&mut Plant::new(self.model, &effects, s.dt)?, s, &self.still, 0.0);
-                let nominal = residual(&mut Plant::nominal(self.model, s.dt), s, &self.still, 0.0);
-                let motion = s.motion(self.model, &self.still);
-                // exact = nominal − Σ θφ + curvature
-                for (x, n) in exact.iter_mut().zip(&nominal) {
-                    x.iter_mut().zip(n).for_each(|(x, n)| *x -= n);
-                }
-                for &c in &fit.set {
-                    let entry = &problem.entries[c];
-                    let theta = entry
-                        .columns
-                        .clone()
-                        .filter_map(|i| fit.columns.iter().position(|&column| column == i).map(|at| fit.theta[at]));
-                    for (column, theta) in entry.candidate.columns(&motion).iter().zip(theta) {
-                        for (j, torque) in &column.rows {
-                            exact[*j].iter_mut().zip(torque).for_each(|(x, t)| *x += theta * t);
-                        }
-                    }
-                }
-                Ok(exact)
-            })
-            .collect()
+    fn candidates(&self, problem: &Problem, set: &[usize]) -> Vec<Candidate> {
+        set.iter().map(|&c| problem.entries[c].candidate.clone()).collect()
+    }
+
+    fn data<'a>(&'a self, noise: &'a [f64]) -> Data<'a> {
+        Data {
+            model: self.model,
+            signals: &self.signals,
+            band: &self.band,
+            standstill: &self.still,
+            moving: &self.moving,
+            noise,
+        }
     }
 
     /// Residuals and state errors on each fold of the model fitted without that fold.
     fn held_out(&self, problem: &Problem, set: &[usize], with_errors: bool) -> Result<HeldOut, EffectError> {
         let fits: Vec<Fit> = (0..self.band.folds).map(|fold| Fit::without_fold(problem, set, fold)).collect();
         let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
+        let side = problem.side(set);
         let n = self.model.dof();
         let mut rows: Rows = vec![vec![0.0; self.band.rows.len()]; n];
         for (e, s) in self.signals.iter().enumerate() {
@@ -225,8 +331,8 @@ impl Logs<'_> {
                 if !self.band.rows[range.clone()].iter().any(|r| r.fold == fold) {
                     continue;
                 }
-                let mut plant = Plant::new(self.model, &effects[fold], s.dt)?;
-                let rest = residual(&mut plant, s, &self.still, fits[fold].alignment());
+                let mut plant = plant_pushed(self.model, &effects[fold], side, s.dt, &s.pushed)?;
+                let rest = residual(&mut plant, self.model, s, &self.still, fits[fold].alignment());
                 for (row, x) in rows.iter_mut().zip(&rest) {
                     let filtered = self.band.filter(e, x);
                     for (i, value) in range.clone().zip(filtered) {
@@ -243,7 +349,7 @@ impl Logs<'_> {
         }
         let errors = if steps {
             horizon::errors(&self.signals, &self.band, n, |dt, fold| {
-                Plant::new(self.model, &effects[fold], dt).unwrap_or_else(|_| Plant::nominal(self.model, dt))
+                plant(self.model, &effects[fold], side, dt).unwrap_or_else(|_| Plant::nominal(self.model, dt))
             })
         } else {
             Errors::unknown()
@@ -262,30 +368,38 @@ impl Logs<'_> {
         let residuals: Vec<Vec<Vec<f64>>> = self
             .signals
             .par_iter()
-            .map(|s| residual(&mut Plant::nominal(self.model, s.dt), s, &self.still, 0.0))
+            .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
             .collect();
         gap::at_rows(&self.band, &residuals, self.model.dof())
     }
 
     fn conclude(
         &self,
-        problem: &Problem,
-        choice: &Choice,
+        chosen: &Chosen,
         rivals: &[Rival],
         data: DataSummary,
         progress: Progress<'_>,
     ) -> Result<Outcome, EffectError> {
         let model = self.model;
         let weights = gap::weights(&self.signals, &self.moving);
-        let fit = Fit::on_all(problem, &choice.set);
+        let (problem, fit) = (&chosen.exact, &chosen.fit);
         let effects = fit.effects(problem, model);
+        let side = problem.side(&fit.set);
         progress("held-out rollouts", 0.7);
         let before = self.nominal();
-        let after = self.held_out(problem, &choice.set, true)?;
+        let after = self.held_out(problem, &fit.set, true)?;
         let final_residuals: Vec<Vec<Vec<f64>>> = self
             .signals
             .iter()
-            .map(|s| Ok(residual(&mut Plant::new(model, &effects, s.dt)?, s, &self.still, fit.alignment())))
+            .map(|s| {
+                Ok(residual(
+                    &mut plant_pushed(model, &effects, side, s.dt, &s.pushed)?,
+                    model,
+                    s,
+                    &self.still,
+                    fit.alignment(),
+                ))
+            })
             .collect::<Result<_, EffectError>>()?;
         let floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof());
         progress("intervals", 0.85);
@@ -294,18 +408,31 @@ impl Logs<'_> {
         let floor_rms = gap::weighted_rms(&floor.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &weights);
         let torque = gap::change(&squares(&before.rows), &squares(&after.rows), &weights, floor_rms);
         let (one_step, rollout) = before.errors.change(&after.errors, &weights);
-        let unexplained = verdict::unexplained_fraction(&torque, floor_rms);
-        let verdict = verdict::verdict(&effects, &torque, floor_rms, unexplained);
-        let found = self.found_effects(problem, &fit, rivals, &torque, &weights)?;
+        // No hand pushes twice alike: what is left while nothing pushes is what a verdict hangs on.
+        let calm = |i: usize| {
+            let row = &self.band.rows[i];
+            let s = &self.signals[row.episode];
+            let time = s.first as f64 * s.raw.dt + row.center as f64 * s.dt;
+            s.pushed.iter().all(|[from, to]| time < from - EDGE || time > to + EDGE)
+        };
+        let apart = |rows: &Rows| gap::squares(&self.band, rows, calm);
+        let away = gap::change(&apart(&before.rows), &apart(&after.rows), &weights, floor_rms);
+        let pushes = effects.iter().any(|e| e.kind() == Kind::ExternalContact);
+        let judged = if pushes { &away } else { &torque };
+        let unexplained = verdict::unexplained_fraction(judged, floor_rms);
+        let verdict = verdict::verdict(&effects, judged, floor_rms, unexplained);
+        let misfit = if verdict == Verdict::Explained { 0.0 } else { unexplained };
+        let found = self.found_effects(chosen, rivals, &torque, misfit, &weights)?;
         let corrected = Corrected {
             schema: MODEL_SCHEMA.to_owned(),
             robot: model.name().to_owned(),
             weights: gap::by_joint(model, weights.iter().copied()),
             standstill: gap::by_joint(model, self.still.iter().copied()),
             band: self.band.cutoff,
-            encoder_side: EncoderSide::Link,
+            encoder_side: side,
             alignment: fit.alignment(),
-            effects,
+            // A push belongs to its own log.
+            effects: effects.into_iter().filter(|e| e.kind() != Kind::ExternalContact).collect(),
         };
         let gap_of = |held_out: &HeldOut| Gap {
             torque: gap::torque_gap(model, &self.band, &held_out.rows, &floor, everything),
@@ -315,7 +442,7 @@ impl Logs<'_> {
         };
         let remaining = gap_of(&after);
         let mut evidence =
-            evidence::evidence(model, &self.signals, &self.band, &self.still, problem, &fit, &before.rows, &after.rows);
+            evidence::evidence(model, &self.signals, &self.band, &self.still, problem, fit, &before.rows, &after.rows);
         let left = remaining.regimes.clone();
         evidence.remaining = (!found.is_empty()).then_some(remaining);
         let diagnosis = Diagnosis {
@@ -327,7 +454,7 @@ impl Logs<'_> {
             gap: gap_of(&before),
             next_experiment: verdict::next_experiment(&found),
             effects: found,
-            alternatives: alternatives(problem, rivals),
+            alternatives: alternatives(&chosen.all, rivals),
             unexplained: Unexplained { fraction: unexplained, regimes: left },
             shrink: Shrink {
                 torque,
@@ -342,13 +469,14 @@ impl Logs<'_> {
 
     fn found_effects(
         &self,
-        problem: &Problem,
-        fit: &Fit,
+        chosen: &Chosen,
         rivals: &[Rival],
         torque: &Change,
+        misfit: f64,
         weights: &[f64],
     ) -> Result<Vec<FoundEffect>, EffectError> {
-        let chosen = select::kinds(problem, &fit.set);
+        let (problem, fit) = (&chosen.exact, &chosen.fit);
+        let kinds = select::kinds(problem, &fit.set);
         let mut found = Vec::new();
         for (effect, own) in fit.effects_with_candidates(problem, self.model) {
             let kind = effect.kind();
@@ -358,9 +486,9 @@ impl Logs<'_> {
                 torque.shrink.zip(torque.before).map(|(_, before)| 1.0 - gap::weighted_rms(&sums, weights) / before);
             let rival = rivals.iter().find(|r| r.without == kind);
             let confused = rival.filter(|r| r.probability > INDISTINGUISHABLE).map_or_else(Vec::new, |r| {
-                select::kinds(problem, &r.choice.set)
+                select::kinds(&chosen.all, &r.choice.set)
                     .into_iter()
-                    .filter(|k| !chosen.contains(k))
+                    .filter(|k| !kinds.contains(k))
                     .map(|k| k.name().to_owned())
                     .collect()
             });
@@ -370,8 +498,8 @@ impl Logs<'_> {
                 FoundEffect {
                     kind: kind.name().to_owned(),
                     joints: effect.law().joints(),
-                    confidence: 1.0 - rival.map_or(0.0, |r| r.probability),
-                    parameters: fit.parameters(problem, self.model, &own),
+                    confidence: (1.0 - rival.map_or(0.0, |r| r.probability)) * (1.0 - misfit).powi(MISFIT),
+                    parameters: fit.parameters(problem, self.model, kind, &own),
                     indistinguishable_from: confused,
                     shrink: EffectShrink { torque: shrink },
                 },

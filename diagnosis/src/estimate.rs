@@ -3,7 +3,7 @@
 use crate::problem::Problem;
 use crate::schema::{Estimate, Parameter, Quantity};
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::{Effect, Value};
+use gapscope_effects::{Effect, Kind, Value};
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -40,11 +40,14 @@ impl Fit {
     /// Time by which the logged effort acts late against the position, s.
     pub fn alignment(&self) -> f64 {
         // Without effects there is nothing to correct, and the nominal model stays as it is.
-        if self.set.is_empty() { 0.0 } else { self.theta.first().copied().unwrap_or(0.0) }
+        match (self.columns.first(), self.theta.first()) {
+            (Some(0), Some(&theta)) if !self.set.is_empty() => theta,
+            _ => 0.0,
+        }
     }
 
     /// Position in `columns` of a candidate's own columns, and their coefficients.
-    fn own(&self, problem: &Problem, candidate: usize) -> (Vec<usize>, Vec<f64>) {
+    pub fn own(&self, problem: &Problem, candidate: usize) -> (Vec<usize>, Vec<f64>) {
         let range = problem.entries[candidate].columns.clone();
         self.columns
             .iter()
@@ -65,18 +68,25 @@ impl Fit {
         let mut effects: Vec<(Effect, Vec<usize>)> = Vec::new();
         for &c in &self.set {
             let (_, theta) = self.own(problem, c);
-            let Some(effect) = problem.entries[c].candidate.effect(model, &theta) else { continue };
-            let apart = effects
-                .iter_mut()
-                .try_fold(effect, |effect, (known, made_of)| known.absorb(effect).ok_or_else(|| made_of.push(c)));
-            // An error says that a known effect of the same kind has taken it in.
-            effects.extend(apart.ok().map(|effect| (effect, vec![c])));
+            for effect in problem.entries[c].effects(model, &theta) {
+                let apart = effects
+                    .iter_mut()
+                    .try_fold(effect, |effect, (known, made_of)| known.absorb(effect).ok_or_else(|| made_of.push(c)));
+                // An error says that a known effect of the same kind has taken it in.
+                effects.extend(apart.ok().map(|effect| (effect, vec![c])));
+            }
         }
         effects
     }
 
-    /// Parameters of an effect made of some candidates under their public names, with 95 % intervals by the delta method.
-    pub fn parameters(&self, problem: &Problem, model: &Model, candidates: &[usize]) -> BTreeMap<String, Parameter> {
+    /// Parameters of an effect of a kind made of some candidates under their public names, with 95 % intervals by the delta method.
+    pub fn parameters(
+        &self,
+        problem: &Problem,
+        model: &Model,
+        kind: Kind,
+        candidates: &[usize],
+    ) -> BTreeMap<String, Parameter> {
         let covariance = problem.covariance(&self.columns, &self.theta);
         let quantile = StudentsT::new(0.0, 1.0, problem.blocks_used().saturating_sub(1).max(1) as f64)
             .map_or(1.96, |t| t.inverse_cdf(0.975));
@@ -85,7 +95,8 @@ impl Fit {
             let (at, theta) = self.own(problem, c);
             let own = DMatrix::from_fn(at.len(), at.len(), |i, k| covariance[(at[i], at[k])]);
             let values = |theta: &[f64]| -> Option<Vec<Value>> {
-                Some(problem.entries[c].candidate.effect(model, theta)?.law().parameters())
+                let effects = problem.entries[c].effects(model, theta);
+                Some(effects.iter().find(|e| e.kind() == kind)?.law().parameters())
             };
             let Some(estimates) = values(&theta) else { continue };
             let slopes: Vec<Option<(f64, Vec<Value>)>> = (0..theta.len())

@@ -43,12 +43,9 @@ pub fn evaluate(
     let weights = corrected.map_or_else(|| gap::weights(&signals, &vec![true; n]), |c| per_joint(model, &c.weights));
     let band = Band::whole(&signals);
     let nominal: Vec<Vec<Vec<f64>>> =
-        signals.iter().map(|s| residual(&mut Plant::nominal(model, s.dt), s, &still, 0.0)).collect();
+        signals.iter().map(|s| residual(&mut Plant::nominal(model, s.dt), model, s, &still, 0.0)).collect();
     let after: Vec<Vec<Vec<f64>>> = match corrected {
-        Some(c) => signals
-            .iter()
-            .map(|s| Ok(residual(&mut Plant::new(model, &c.effects, s.dt)?, s, &still, c.alignment)))
-            .collect::<Result<_, EffectError>>()?,
+        Some(c) => signals.iter().map(|s| c.residual(model, s)).collect::<Result<_, EffectError>>()?,
         None => nominal.clone(),
     };
     let floor = noise_floor(&signals, &band, &after, n);
@@ -61,9 +58,8 @@ pub fn evaluate(
     };
     let shrink = match corrected {
         Some(c) => {
-            Plant::new(model, &c.effects, 1e-3)?;
             let errors = horizon::errors_of(&signals, &band, model, |dt| {
-                Plant::new(model, &c.effects, dt).unwrap_or_else(|_| Plant::nominal(model, dt))
+                c.plant(model, dt).unwrap_or_else(|_| Plant::nominal(model, dt))
             });
             let (one_step, rollout) = before_errors.change(&errors, &weights);
             let reference = Reference { noise_floor: floor_rms, residual_network: None, pure_network: None };

@@ -8,6 +8,7 @@
 
 mod band;
 mod bootstrap;
+mod contact;
 mod corrected;
 mod diagnose;
 mod estimate;
@@ -18,14 +19,17 @@ mod gap;
 mod horizon;
 mod kernel;
 mod problem;
+mod refine;
 mod regimes;
 mod rollout;
 pub mod schema;
+mod screen;
 mod select;
 mod signals;
 mod verdict;
 
-pub use corrected::{Corrected, CorrectedError, EncoderSide, MODEL_SCHEMA};
+pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};
 pub use diagnose::{Outcome, Progress, diagnose};
 pub use evaluate::{Predictions, evaluate};
 pub use rollout::{BoundGrowth, ModelRollouts, RolloutError, RolloutOptions, Rollouts, rollouts};
+pub use gapscope_effects::EncoderSide;

@@ -4,13 +4,17 @@
 use crate::band::Band;
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
-use gapscope_effects::{Candidate, Column};
+use gapscope_effects::{Candidate, Column, Effect, EncoderSide, Kind, Motion};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Residuals beyond this many standard deviations get less weight (Huber 1964).
 const HUBER: f64 = 3.0;
+/// No law is exact to better than this part of the torque that it explains.
+const INEXACT: f64 = 0.003;
+/// Beyond this multiple of that, the weight falls with the square.
+const FAR: f64 = 2.0;
 /// Errors under this part of a joint's effort are nobody's concern: they are what sampling and integration leave.
 const IMMATERIAL: f64 = 1e-3;
 /// An effect must move some joint by this multiple of the immaterial part of its effort, ...
@@ -20,6 +24,8 @@ const MATERIAL: f64 = 3.0;
 const OF_NOISE: f64 = 0.2;
 /// Eigenvalues of a candidate's normal equations below this part of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-6;
+/// Part of a column's size below which what a set leaves of it is rounding.
+const GAIN_RIDGE: f64 = 1e-7;
 /// Relative ridge that keeps the normal equations regular.
 const RIDGE: f64 = 1e-9;
 
@@ -32,7 +38,67 @@ pub struct Entry {
     pub columns: Range<usize>,
     /// How many of its coefficients these logs can tell apart at all.
     pub rank: usize,
+    /// Whether the last column is the tangent of the knob, its coefficient the change of the knob.
+    pub tangent: bool,
 }
+
+impl Entry {
+    /// The effects with the coefficients of the entry's columns.
+    pub fn effects(&self, model: &Model, theta: &[f64]) -> Vec<Effect> {
+        match theta.split_last() {
+            Some((change, rest)) if self.tangent => {
+                let shape = (self.candidate.shape + change).max(KNOB_AT_LEAST * self.candidate.shape);
+                Candidate { shape, ..self.candidate.clone() }.effects(model, rest)
+            }
+            _ => self.candidate.effects(model, theta),
+        }
+    }
+}
+
+/// A candidate for the problem, with the coefficients at which the tangent of its knob is taken, where it is wanted.
+#[derive(Debug, Clone)]
+pub struct Term {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// Coefficients of the candidate's columns.
+    pub tangent_at: Option<Vec<f64>>,
+}
+
+impl Term {
+    /// The columns of the candidate on a motion, the tangent of its knob last where it is wanted.
+    pub fn columns(&self, motion: &Motion) -> Vec<Column> {
+        let mut columns = self.candidate.columns(motion);
+        if let Some(theta) = &self.tangent_at {
+            let step = KNOB_STEP * self.candidate.shape;
+            let moved = Candidate { shape: self.candidate.shape + step, ..self.candidate.clone() }.columns(motion);
+            let mut tangent = Column {
+                rows: columns[0].rows.iter().map(|(j, x)| (*j, vec![0.0; x.len()])).collect(),
+                at_least: -KNOB_CHANGE * self.candidate.shape,
+                at_most: KNOB_CHANGE * self.candidate.shape,
+            };
+            if self.candidate.kind == Kind::TorqueSaturation {
+                // A limit cuts all that is beyond it.
+                (columns[0].at_least, columns[0].at_most) = (1.0, 1.0);
+            }
+            for ((theta, here), there) in theta.iter().zip(&columns).zip(&moved) {
+                for ((row, here), there) in tangent.rows.iter_mut().zip(&here.rows).zip(&there.rows) {
+                    for ((t, h), m) in row.1.iter_mut().zip(&here.1).zip(&there.1) {
+                        *t += theta * (m - h) / step;
+                    }
+                }
+            }
+            columns.push(tangent);
+        }
+        columns
+    }
+}
+
+/// Relative step of the numerical derivative with respect to a knob.
+const KNOB_STEP: f64 = 1e-3;
+/// Greatest relative change of a knob in one round.
+const KNOB_CHANGE: f64 = 0.4;
+/// Least part of a knob that a change may leave.
+const KNOB_AT_LEAST: f64 = 0.1;
 
 /// Rows of one joint: filtered columns and target.
 #[derive(Debug, Clone)]
@@ -100,6 +166,8 @@ pub struct Problem {
     folds: usize,
     blocks: Vec<Normal>,
     training: Vec<Normal>,
+    /// Of the rows of each fold.
+    held: Vec<Normal>,
     total: Normal,
 }
 
@@ -112,12 +180,11 @@ impl Problem {
         band: &Band,
         standstill: &[f64],
         moving: &[bool],
-        candidates: Vec<Candidate>,
+        terms: Vec<Term>,
         noise: &[f64],
     ) -> Problem {
         let n = model.dof();
-        let candidates: Vec<Candidate> =
-            candidates.into_iter().filter(|c| c.joints.iter().all(|&j| moving[j]) || c.joints.is_empty()).collect();
+        let terms: Vec<Term> = terms.into_iter().filter(|t| t.candidate.joints.iter().all(|&j| moving[j])).collect();
         let half_sample = 0.5 * signals.iter().map(|s| s.raw.dt).fold(f64::INFINITY, f64::min);
         let mut entries = Vec::new();
         let mut bounds = vec![(-half_sample, half_sample)];
@@ -138,12 +205,14 @@ impl Problem {
                 at_least: -half_sample,
                 at_most: half_sample,
             };
-            let columns: Vec<Vec<Column>> = candidates.par_iter().map(|c| c.columns(&motion)).collect();
+            let columns: Vec<Vec<Column>> = terms.par_iter().map(|t| t.columns(&motion)).collect();
             if e == 0 {
-                for (candidate, columns) in candidates.iter().zip(&columns) {
+                for (term, columns) in terms.iter().zip(&columns) {
                     let begin = bounds.len();
                     bounds.extend(columns.iter().map(|c| (c.at_least, c.at_most)));
-                    entries.push(Entry { candidate: candidate.clone(), columns: begin..bounds.len(), rank: 0 });
+                    let tangent = term.tangent_at.is_some();
+                    let candidate = term.candidate.clone();
+                    entries.push(Entry { candidate, columns: begin..bounds.len(), rank: 0, tangent });
                 }
                 let all = std::iter::once(&alignment).chain(columns.iter().flatten());
                 for (index, column) in all.enumerate() {
@@ -203,6 +272,7 @@ impl Problem {
             folds: band.folds,
             blocks: Vec::new(),
             training: Vec::new(),
+            held: Vec::new(),
             total: Normal::zeros(p),
         };
         problem.weigh(band);
@@ -216,6 +286,22 @@ impl Problem {
             })
             .collect();
         problem
+    }
+
+    /// What a fit of all candidates, deaf to what stands far out, leaves at each row: `[joint][row]`; 0 where a row is out.
+    pub fn robust_rest(&self, rows: usize) -> Vec<Vec<f64>> {
+        let all: Vec<usize> = (0..self.bounds.len()).collect();
+        let theta = self.solve_unbounded(&all, &self.total);
+        self.joints
+            .iter()
+            .map(|joint| {
+                let mut rest = vec![0.0; rows];
+                for (&row, r) in joint.rows.iter().zip(joint.residual(&all, &theta)) {
+                    rest[row] = r;
+                }
+                rest
+            })
+            .collect()
     }
 
     /// Rows that count as independent, all joints together; two at least.
@@ -251,8 +337,8 @@ impl Problem {
         self.sigma = self.scale.clone();
         self.accumulate(band);
         let all: Vec<usize> = (0..self.bounds.len()).collect();
-        for _ in 0..3 {
-            let theta = self.solve(&all, &self.total);
+        for _ in 0..5 {
+            let theta = self.solve_unbounded(&all, &self.total);
             for (j, rows) in self.joints.iter_mut().enumerate() {
                 let rest = rows.residual(&all, &theta);
                 if rest.len() < 8 {
@@ -264,7 +350,14 @@ impl Problem {
                 let least = IMMATERIAL * self.scale[j];
                 for (weight, r) in rows.robust.iter_mut().zip(&rest) {
                     let z = r.abs() / (HUBER * spread.max(least));
-                    *weight = if z > 1.0 { 1.0 / z } else { 1.0 };
+                    // Huber near, and far out as if the row were not there.
+                    *weight = if z > FAR {
+                        FAR / (z * z)
+                    } else if z > 1.0 {
+                        1.0 / z
+                    } else {
+                        1.0
+                    };
                 }
                 let clipped: Vec<f64> = rest.iter().zip(&rows.robust).map(|(r, w)| r * w).collect();
                 let free = rows.rows.len().saturating_sub(rows.columns.len()).max(1);
@@ -273,55 +366,119 @@ impl Problem {
             }
             self.accumulate(band);
         }
+        for (rows, sigma) in self.joints.iter_mut().zip(&self.sigma) {
+            for (weight, target) in rows.robust.iter_mut().zip(&rows.linear_target) {
+                *weight /= 1.0 + (INEXACT * target / sigma).powi(2);
+            }
+        }
+        self.accumulate(band);
     }
 
     /// Normal equations of every block. Rows are weighted, not whitened: whitening would rest the fit on the fast edges of
     /// the signals, where simple laws (a friction step) are least true.
     fn accumulate(&mut self, band: &Band) {
         let p = self.bounds.len();
-        let mut blocks = vec![Normal::zeros(p); band.blocks];
-        for (j, rows) in self.joints.iter().enumerate() {
-            let scale = 1.0 / (self.sigma[j] * self.sigma[j] * self.correlation[j]);
-            let m = rows.columns.len();
-            for (i, &row) in rows.rows.iter().enumerate() {
-                let normal = &mut blocks[band.rows[row].block];
-                let weight = rows.robust[i] * scale;
-                let values = &rows.values[i * m..(i + 1) * m];
-                let target = rows.target[i];
-                normal.square += weight * target * target;
-                for (a, &ca) in rows.columns.iter().enumerate() {
-                    let x = weight * values[a];
-                    normal.moment[ca] += x * target;
-                    for (b, &cb) in rows.columns[..=a].iter().enumerate() {
-                        // Columns ascend, so this fills the lower triangle.
-                        normal.gram[(ca, cb)] += x * values[b];
+        let joints = &self.joints;
+        let (sigma, correlation) = (&self.sigma, &self.correlation);
+        let blocks: Vec<Normal> = (0..band.blocks)
+            .into_par_iter()
+            .map(|block| {
+                let mut normal = Normal::zeros(p);
+                for (j, rows) in joints.iter().enumerate() {
+                    let scale = 1.0 / (sigma[j] * sigma[j] * correlation[j]);
+                    let m = rows.columns.len();
+                    let mine: Vec<usize> =
+                        (0..rows.rows.len()).filter(|&i| band.rows[rows.rows[i]].block == block).collect();
+                    if mine.is_empty() {
+                        continue;
+                    }
+                    let weight: Vec<f64> = mine.iter().map(|&i| (rows.robust[i] * scale).sqrt()).collect();
+                    let x = DMatrix::from_fn(mine.len(), m, |r, c| weight[r] * rows.values[mine[r] * m + c]);
+                    let y = DVector::from_fn(mine.len(), |r, _| weight[r] * rows.target[mine[r]]);
+                    normal.square += y.norm_squared();
+                    let (gram, moment) = (x.tr_mul(&x), x.tr_mul(&y));
+                    for (a, &ca) in rows.columns.iter().enumerate() {
+                        normal.moment[ca] += moment[a];
+                        for (b, &cb) in rows.columns.iter().enumerate() {
+                            normal.gram[(cb, ca)] += gram[(b, a)];
+                        }
                     }
                 }
-            }
-        }
-        let mut total = Normal::zeros(p);
-        for normal in &mut blocks {
-            normal.gram.fill_upper_triangle_with_lower_triangle();
-            total.add(normal);
-        }
-        self.training = (0..self.folds)
-            .map(|fold| {
-                let mut rest = Normal::zeros(p);
-                for (normal, &of) in blocks.iter().zip(&self.fold_of_block) {
-                    if of != fold {
-                        rest.add(normal);
-                    }
-                }
-                rest
+                normal
             })
             .collect();
+        let mut total = Normal::zeros(p);
+        for normal in &blocks {
+            total.add(normal);
+        }
+        let fold_of_block = &self.fold_of_block;
+        let sum = |keep: &(dyn Fn(usize) -> bool + Sync)| {
+            let mut sum = Normal::zeros(p);
+            blocks.iter().zip(fold_of_block).filter(|(_, of)| keep(**of)).for_each(|(normal, _)| sum.add(normal));
+            sum
+        };
+        self.training = (0..self.folds).into_par_iter().map(|fold| sum(&|of| of != fold)).collect();
+        self.held = (0..self.folds).into_par_iter().map(|fold| sum(&|of| of == fold)).collect();
         self.blocks = blocks;
         self.total = total;
     }
 
-    /// Columns of a set of candidates, the alignment first.
+    /// Columns of a set of candidates, the alignment first, unless an effect of the set says how late the effort acts.
     pub fn columns(&self, set: &[usize]) -> Vec<usize> {
-        std::iter::once(0).chain(set.iter().flat_map(|&c| self.entries[c].columns.clone())).collect()
+        let late = |&c: &usize| matches!(self.entries[c].candidate.kind, Kind::ActuationDelay | Kind::ActuatorLag);
+        let alignment = (!set.iter().any(late)).then_some(0);
+        alignment.into_iter().chain(set.iter().flat_map(|&c| self.entries[c].columns.clone())).collect()
+    }
+
+    /// Side of the transmission that a set takes the log to show.
+    pub fn side(&self, set: &[usize]) -> EncoderSide {
+        let motor = set.iter().any(|&c| self.entries[c].candidate.side == EncoderSide::Motor);
+        if motor { EncoderSide::Motor } else { EncoderSide::Link }
+    }
+
+    /// Puts other candidates of the same kinds and joints in the places of some entries.
+    pub fn replace(
+        &mut self,
+        model: &Model,
+        signals: &[Signals],
+        band: &Band,
+        standstill: &[f64],
+        changes: &[(usize, Candidate)],
+    ) {
+        for (c, candidate) in changes {
+            let begin = self.entries[*c].columns.start;
+            let runs: Vec<Vec<Column>> =
+                signals.iter().map(|s| candidate.columns(&s.motion(model, standstill))).collect();
+            self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
+                let mut values: Vec<Vec<f64>> = vec![vec![0.0; band.rows.len()]; runs[0].len()];
+                let mut touched = false;
+                for (e, columns) in runs.iter().enumerate() {
+                    let counts: Vec<bool> = signals[e].v[j].iter().map(|v| v.abs() >= standstill[j]).collect();
+                    for (values, column) in values.iter_mut().zip(columns) {
+                        for (_, x) in column.rows.iter().filter(|(row, _)| *row == j) {
+                            touched = true;
+                            for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts, x)) {
+                                values[row] = x.unwrap_or(0.0);
+                            }
+                        }
+                    }
+                }
+                if touched {
+                    let m = rows.columns.len();
+                    for (i, values) in values.iter().enumerate() {
+                        let Some(at) = rows.columns.iter().position(|&column| column == begin + i) else { continue };
+                        for (r, &row) in rows.rows.iter().enumerate() {
+                            rows.values[r * m + at] = values[row];
+                        }
+                    }
+                }
+            });
+            for (i, column) in runs[0].iter().enumerate() {
+                self.bounds[begin + i] = (column.at_least, column.at_most);
+            }
+            self.entries[*c].candidate = candidate.clone();
+        }
+        self.accumulate(band);
     }
 
     /// Coefficients of the columns on all rows.
@@ -343,6 +500,12 @@ impl Problem {
             .zip(&self.fold_of_block)
             .map(|(block, &fold)| block.deviance(&columns, &fits[fold]))
             .collect()
+    }
+
+    /// Held-out deviance of all blocks together.
+    pub fn held_out_total(&self, set: &[usize]) -> f64 {
+        let columns = self.columns(set);
+        (0..self.folds).map(|fold| self.held[fold].deviance(&columns, &self.fit_without(&columns, fold))).sum()
     }
 
     /// Covariance of the coefficients by the sandwich over blocks, which allows for any correlation inside a block.
@@ -388,6 +551,53 @@ impl Problem {
         gram
     }
 
+    /// Least squares without bounds.
+    fn solve_unbounded(&self, columns: &[usize], normal: &Normal) -> Vec<f64> {
+        let moment = DVector::from_fn(columns.len(), |i, _| normal.moment[columns[i]]);
+        self.regular(columns, normal)
+            .cholesky()
+            .map_or_else(|| vec![0.0; columns.len()], |c| c.solve(&moment).iter().copied().collect())
+    }
+
+    /// By how much each candidate would lower the deviance if it joined a set, all coefficients free; 0 for those in it.
+    /// What is fitted to is all rows: a first look, for choosing what to hold out.
+    pub fn gains(&self, set: &[usize]) -> Vec<f64> {
+        let columns = self.columns(set);
+        let m = columns.len();
+        let none = || vec![0.0; self.entries.len()];
+        let Some(factor) = self.regular(&columns, &self.total).cholesky() else { return none() };
+        let theta = self.solve(&columns, &self.total);
+        self.entries
+            .par_iter()
+            .enumerate()
+            .map(|(c, entry)| {
+                if set.contains(&c) {
+                    return 0.0;
+                }
+                let own = entry.columns.clone();
+                let k = own.len();
+                let cross = DMatrix::from_fn(m, k, |i, j| self.total.gram[(columns[i], own.start + j)]);
+                let rest = DVector::from_fn(k, |j, _| {
+                    self.total.moment[own.start + j] - (0..m).map(|i| cross[(i, j)] * theta[i]).sum::<f64>()
+                });
+                let mut schur = DMatrix::from_fn(k, k, |i, j| self.total.gram[(own.start + i, own.start + j)]);
+                let size: Vec<f64> = (0..k).map(|i| schur[(i, i)]).collect();
+                schur -= cross.tr_mul(&factor.solve(&cross));
+                if k == 1 {
+                    let (low, high) = self.bounds[own.start];
+                    let step = rest[0] / schur[(0, 0)].max(GAIN_RIDGE * size[0]).max(f64::MIN_POSITIVE);
+                    return if (step < 0.0 && low >= 0.0) || (step > 0.0 && high <= 0.0) {
+                        0.0
+                    } else {
+                        step * rest[0]
+                    };
+                }
+                (0..k).for_each(|i| schur[(i, i)] += GAIN_RIDGE * size[i] + f64::MIN_POSITIVE.sqrt());
+                schur.cholesky().map_or(0.0, |f| rest.dot(&f.solve(&rest)))
+            })
+            .collect()
+    }
+
     /// Bounded least squares by an active set: coefficients beyond a bound are held there while that lowers the deviance.
     fn solve(&self, columns: &[usize], normal: &Normal) -> Vec<f64> {
         let m = columns.len();
@@ -429,6 +639,9 @@ impl Problem {
             let release = (0..m).filter(|&i| held[i].is_some()).find(|&i| {
                 let gradient: f64 = moment[i] - (0..m).map(|j| gram[(i, j)] * theta[j]).sum::<f64>();
                 let (low, high) = self.bounds[columns[i]];
+                if low == high {
+                    return false;
+                }
                 let tolerance = 1e-9 * (gram[(i, i)] * normal.square).sqrt();
                 (theta[i] <= low && gradient > tolerance) || (theta[i] >= high && gradient < -tolerance)
             });

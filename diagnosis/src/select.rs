@@ -1,7 +1,7 @@
 //! Which candidates: best subset by local search on held-out deviance, then pruning by the one-standard-error rule.
 
 use crate::problem::Problem;
-use gapscope_effects::Kind;
+use gapscope_effects::{Candidate, Kind};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -10,17 +10,43 @@ const KIND_COST: f64 = 2.0;
 /// Cost of a coefficient on a further joint of a kind that joints usually share, because their drives are alike.
 const SHARED_COST: f64 = 2.0;
 /// Kinds that joints usually share.
-const SHARED: [Kind; 4] = [Kind::ViscousFriction, Kind::CoulombFriction, Kind::Armature, Kind::TorqueBias];
+const SHARED: [Kind; 9] = [
+    Kind::ViscousFriction,
+    Kind::CoulombFriction,
+    Kind::StribeckFriction,
+    Kind::LoadDependentFriction,
+    Kind::PreslidingFriction,
+    Kind::ThermalDrift,
+    Kind::Armature,
+    Kind::TorqueBias,
+    Kind::TorqueRipple,
+];
+/// Dry friction of a joint is one of these.
+const DRY: [Kind; 4] = [Kind::CoulombFriction, Kind::StribeckFriction, Kind::PreslidingFriction, Kind::ThermalDrift];
+/// A rotor's inertia is part of the last two.
+const DRIVE: [Kind; 3] = [Kind::Armature, Kind::JointElasticity, Kind::Backlash];
+/// Ways in which effort acts late.
+const LATE: [Kind; 2] = [Kind::ActuationDelay, Kind::ActuatorLag];
+/// A spring's rest position is a bias.
+const CONSTANT: [Kind; 2] = [Kind::ParallelSpring, Kind::TorqueBias];
+/// Candidates that a first look sends to be held out, in each direction of the search.
+const SHORTLIST: usize = 12;
 /// Cost of a kind that few robots have: where two kinds explain the same, it is the commoner one, by prior.
 const RARE_COST: f64 = 2.0;
 /// A candidate stays where leaving it out costs more than this many standard errors of the paired difference over blocks.
 const STANDARD_ERRORS: f64 = 2.0;
+/// A candidate stays where the deviance without it is this many times that with it.
+const DECISIVE: f64 = 1.5;
 /// The same for a further joint of a kind that joints usually share.
 const SHARED_STANDARD_ERRORS: f64 = 0.5;
 /// And the part of the least torque of a new effect that it must move the joint by.
 const SHARED_SIZE: f64 = 0.5;
+/// Moves towards a rival: what explains the same does so soon.
+const RIVAL_MOVES: usize = 8;
 /// Moves of the local search, at most.
-const MOVES: usize = 60;
+const MOVES: usize = 40;
+/// Kinds of effects side by side, at most: more are a sign that none of them is right.
+const KINDS_AT_MOST: usize = 6;
 
 /// A set of candidates with its held-out deviance.
 #[derive(Debug, Clone)]
@@ -54,42 +80,77 @@ pub fn kinds(problem: &Problem, set: &[usize]) -> Vec<Kind> {
 
 /// Chooses a set of candidates, none of the kinds in `forbidden`, starting from `start`.
 pub fn choose(problem: &Problem, start: &[usize], forbidden: &[Kind]) -> Choice {
-    let mut best = evaluate(problem, start.to_vec());
-    for _ in 0..MOVES {
-        let next = moves(problem, &best.set, forbidden)
-            .into_par_iter()
-            .map(|set| evaluate(problem, set))
-            .min_by(|a, b| a.objective.total_cmp(&b.objective).then_with(|| a.set.cmp(&b.set)));
-        match next {
-            Some(next) if next.objective < best.objective - 1e-9 * best.objective.abs() => best = next,
-            _ => break,
-        }
-    }
+    let best = search(problem, start, forbidden, MOVES);
     let simple = simplify(problem, prune(problem, best), forbidden);
     prune(problem, grow(problem, simple))
 }
 
-/// Takes the simpler of two nested laws, a bias for a spring, where the richer one is not better by a standard error or
+/// Local search, at most so many moves: near neighbours first, wider ones where those do not help.
+fn search(problem: &Problem, start: &[usize], forbidden: &[Kind], moves_at_most: usize) -> Choice {
+    let mut best = (objective(problem, start), start.to_vec());
+    let mut reach = Reach::Add;
+    for _ in 0..moves_at_most {
+        let next = moves(problem, &best.1, forbidden, reach)
+            .into_par_iter()
+            .map(|set| (objective(problem, &set), set))
+            .min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
+        match (next, reach) {
+            (Some(next), _) if next.0 < best.0 - 1e-9 * best.0.abs() => {
+                best = next;
+                reach = Reach::Add;
+            }
+            (_, Reach::Add) => reach = Reach::SwapKinds,
+            (_, Reach::SwapKinds) => reach = Reach::Swap,
+            (_, Reach::Swap) => break,
+        }
+    }
+    evaluate(problem, best.1)
+}
+
+/// How far a move of the search goes from the set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Reach {
+    /// One candidate more, or a kind on all joints.
+    Add,
+    /// A kind less, or exchanged.
+    SwapKinds,
+    /// A candidate less, or exchanged.
+    Swap,
+}
+
+/// Laws that hold a simpler one.
+const NESTED: [(Kind, Kind); 6] = [
+    (Kind::ParallelSpring, Kind::TorqueBias),
+    (Kind::StribeckFriction, Kind::CoulombFriction),
+    (Kind::PreslidingFriction, Kind::CoulombFriction),
+    (Kind::ThermalDrift, Kind::CoulombFriction),
+    (Kind::JointElasticity, Kind::Armature),
+    (Kind::Backlash, Kind::Armature),
+];
+
+/// Takes the simpler of two nested laws, a bias for a spring, where the richer one is not better by two standard errors or
 /// its torque hardly differs.
 fn simplify(problem: &Problem, mut choice: Choice, forbidden: &[Kind]) -> Choice {
-    if forbidden.contains(&Kind::TorqueBias) {
-        return choice;
-    }
     for c in choice.set.clone() {
-        let spring = &problem.entries[c].candidate;
-        if spring.kind != Kind::ParallelSpring {
-            continue;
-        }
-        let bias = (0..problem.entries.len()).find(|&other| {
+        let rich = &problem.entries[c].candidate;
+        let Some(&(_, simple)) = NESTED.iter().find(|(kind, _)| *kind == rich.kind) else { continue };
+        let simpler = (0..problem.entries.len()).find(|&other| {
             let other = &problem.entries[other].candidate;
-            other.kind == Kind::TorqueBias && other.joints == spring.joints
+            other.kind == simple && other.joints == rich.joints && !forbidden.contains(&simple)
         });
-        let Some(bias) = bias else { continue };
-        let set = choice.set.iter().map(|&other| if other == c { bias } else { other }).collect();
+        let Some(simpler) = simpler else { continue };
+        let set = choice.set.iter().map(|&other| if other == c { simpler } else { other }).collect();
         let simpler = evaluate(problem, set);
         let (loss, error) = paired_difference(&simpler.blocks, &choice.blocks);
-        let same = moved(problem, &choice, &simpler).iter().zip(&problem.least).all(|(moved, least)| moved <= least);
-        if loss <= error || same {
+        let alone = choice.set.iter().filter(|&&o| problem.entries[o].candidate.kind == rich.kind).count() == 1;
+        let (needed, part) = if alone || !SHARED.contains(&rich.kind) {
+            (STANDARD_ERRORS, 1.0)
+        } else {
+            (SHARED_STANDARD_ERRORS, SHARED_SIZE)
+        };
+        let same =
+            moved(problem, &choice, &simpler).iter().zip(&problem.least).all(|(moved, least)| *moved <= part * least);
+        if loss <= needed * error || same {
             choice = simpler;
         }
     }
@@ -124,7 +185,7 @@ pub fn rivals(problem: &Problem, choice: &Choice) -> Vec<Rival> {
         .map(|without| {
             let rest: Vec<usize> =
                 choice.set.iter().copied().filter(|&c| problem.entries[c].candidate.kind != without).collect();
-            let rival = choose(problem, &rest, &[without]);
+            let rival = search(problem, &rest, &[without], RIVAL_MOVES);
             let same = moved(problem, choice, &rival).iter().zip(&problem.least).all(|(moved, least)| moved <= least);
             let probability = if same {
                 // They differ by less than what neither explains: only simplicity and prior speak, and never for the rival.
@@ -142,11 +203,25 @@ pub fn rivals(problem: &Problem, choice: &Choice) -> Vec<Rival> {
 pub fn evaluate(problem: &Problem, mut set: Vec<usize>) -> Choice {
     set.sort_unstable();
     let blocks = problem.held_out(&set);
-    let cost: f64 = kinds(problem, &set)
+    let objective = blocks.iter().sum::<f64>() + cost(problem, &set);
+    Choice { set, blocks, objective }
+}
+
+/// Held-out deviance and cost of complexity of a set.
+fn objective(problem: &Problem, set: &[usize]) -> f64 {
+    if kinds(problem, set).len() > KINDS_AT_MOST {
+        return f64::INFINITY;
+    }
+    problem.held_out_total(set) + cost(problem, set)
+}
+
+/// Cost of the complexity of a set, in units of deviance.
+fn cost(problem: &Problem, set: &[usize]) -> f64 {
+    kinds(problem, set)
         .into_iter()
         .map(|kind| {
             let of_kind = || set.iter().map(|&c| &problem.entries[c]).filter(move |e| e.candidate.kind == kind);
-            let coefficients: usize = of_kind().map(|e| e.rank).sum();
+            let coefficients: usize = of_kind().map(|e| e.rank + usize::from(e.candidate.has_knob())).sum();
             let unit = problem.effective_rows().ln();
             if SHARED.contains(&kind) {
                 (1.0 + KIND_COST) * unit + SHARED_COST * (coefficients - 1) as f64
@@ -154,62 +229,64 @@ pub fn evaluate(problem: &Problem, mut set: Vec<usize>) -> Choice {
                 (coefficients as f64 + KIND_COST) * unit + RARE_COST
             }
         })
-        .sum();
-    let objective = blocks.iter().sum::<f64>() + cost;
-    Choice { set, blocks, objective }
+        .sum()
 }
 
-/// Neighbours of a set: one candidate more, less or exchanged; a kind on all joints more, less or exchanged.
-fn moves(problem: &Problem, set: &[usize], forbidden: &[Kind]) -> Vec<Vec<usize>> {
-    let allowed = |c: usize| !forbidden.contains(&problem.entries[c].candidate.kind);
-    let fits_in = |set: &[usize], c: usize| allowed(c) && !set.iter().any(|&other| excludes(problem, other, c));
-    let count = problem.entries.len();
+/// Neighbours of a set: one candidate more, less or exchanged; a kind on all joints more, less or exchanged. What comes in
+/// is what a first look finds best.
+fn moves(problem: &Problem, set: &[usize], forbidden: &[Kind], reach: Reach) -> Vec<Vec<usize>> {
+    let kind_of = |c: usize| problem.entries[c].candidate.kind;
+    let without = |gone: &dyn Fn(usize) -> bool| -> Vec<usize> { set.iter().copied().filter(|&c| !gone(c)).collect() };
     let mut neighbours = Vec::new();
-    let without = |gone: usize| -> Vec<usize> { set.iter().copied().filter(|&c| c != gone).collect() };
-    let with = |mut base: Vec<usize>, c: usize| {
-        base.push(c);
-        base
-    };
-    for c in (0..count).filter(|&c| fits_in(set, c)) {
-        neighbours.push(with(set.to_vec(), c));
-    }
-    for &gone in set {
-        let rest = without(gone);
-        let joints = &problem.entries[gone].candidate.joints;
-        for c in (0..count).filter(|&c| c != gone && fits_in(&rest, c)) {
-            let other = &problem.entries[c].candidate.joints;
-            if other.is_empty() || joints.is_empty() || joints.iter().any(|j| other.contains(j)) {
-                neighbours.push(with(rest.clone(), c));
+    // Each base with what may come in: `near` holds for candidates that can stand for what has gone.
+    let mut from = |base: Vec<usize>, near: &dyn Fn(usize) -> bool| {
+        let gains = problem.gains(&base);
+        let mut open: Vec<usize> = (0..problem.entries.len())
+            .filter(|&c| gains[c] > 0.0 && !forbidden.contains(&kind_of(c)))
+            .filter(|&c| !base.iter().any(|&other| excludes(problem, other, c)))
+            .collect();
+        open.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]).then(a.cmp(&b)));
+        let mut seen = Vec::new();
+        for &c in open.iter().filter(|&&c| near(c)) {
+            // The best of each kind has its chance, however many better ones of other kinds there are.
+            let of_kind = seen.iter().filter(|k| **k == kind_of(c)).count();
+            if of_kind == 0 || (seen.len() < SHORTLIST && of_kind < 3) {
+                seen.push(kind_of(c));
+                neighbours.push(base.iter().copied().chain([c]).collect());
             }
         }
-        neighbours.push(rest);
-    }
-    let fill = |mut base: Vec<usize>, kind: Kind| {
-        for c in 0..count {
-            if problem.entries[c].candidate.kind == kind && fits_in(&base, c) {
-                base.push(c);
+        let mut kinds: Vec<Kind> = open.iter().map(|&c| kind_of(c)).collect();
+        kinds.sort();
+        kinds.dedup();
+        for kind in kinds {
+            let mut filled = base.clone();
+            for &c in open.iter().filter(|&&c| kind_of(c) == kind) {
+                if !filled.iter().any(|&other| excludes(problem, other, c)) {
+                    filled.push(c);
+                }
+            }
+            if filled.len() > base.len() + 1 {
+                neighbours.push(filled);
             }
         }
-        base
+        neighbours.push(base);
     };
-    let present = kinds(problem, set);
-    let per_joint = [
-        Kind::ViscousFriction,
-        Kind::CoulombFriction,
-        Kind::Armature,
-        Kind::TorqueGainError,
-        Kind::TorqueBias,
-        Kind::ParallelSpring,
-    ];
-    for kind in per_joint {
-        neighbours.push(fill(set.to_vec(), kind));
-    }
-    for &gone in &present {
-        let rest: Vec<usize> = set.iter().copied().filter(|&c| problem.entries[c].candidate.kind != gone).collect();
-        for kind in Kind::LINEAR.into_iter().filter(|&k| k != gone) {
-            neighbours.push(fill(rest.clone(), kind));
+    match reach {
+        Reach::Add => from(set.to_vec(), &|_| true),
+        Reach::SwapKinds => {
+            for gone in kinds(problem, set) {
+                from(without(&|c| kind_of(c) == gone), &|c| kind_of(c) != gone);
+            }
         }
-        neighbours.push(rest);
+        Reach::Swap => {
+            for &gone in set {
+                let joints = &problem.entries[gone].candidate.joints;
+                from(without(&|c| c == gone), &|c| {
+                    let other = &problem.entries[c].candidate.joints;
+                    c != gone && (other.is_empty() || joints.is_empty() || joints.iter().any(|j| other.contains(j)))
+                });
+            }
+        }
     }
     neighbours.iter_mut().for_each(|s| s.sort_unstable());
     neighbours.sort();
@@ -218,12 +295,15 @@ fn moves(problem: &Problem, set: &[usize], forbidden: &[Kind]) -> Vec<Vec<usize>
     neighbours
 }
 
-/// Whether two candidates must not stand side by side: the same one, a spring beside a bias (its rest position is one),
-/// or the two signs of a coupling.
+/// Whether two candidates must not stand side by side: two of one kind at the same joints, two accounts of the same force,
+/// or two accounts of where the encoder sits.
 fn excludes(problem: &Problem, a: usize, b: usize) -> bool {
     let (a, b) = (&problem.entries[a].candidate, &problem.entries[b].candidate);
-    let pair = |x, y| (a.kind == x && b.kind == y) || (a.kind == y && b.kind == x);
-    a.joints == b.joints && (a.kind == b.kind || pair(Kind::ParallelSpring, Kind::TorqueBias))
+    let both = |family: &[Kind]| family.contains(&a.kind) && family.contains(&b.kind);
+    let elastic = |c: &Candidate| matches!(c.kind, Kind::JointElasticity | Kind::Backlash);
+    (a.joints == b.joints && (a.kind == b.kind || both(&DRY) || both(&DRIVE) || both(&CONSTANT)))
+        || both(&LATE)
+        || (elastic(a) && elastic(b) && a.side != b.side)
 }
 
 /// Takes away, weakest first, what does not lower the held-out deviance beyond doubt or does not matter.
@@ -252,7 +332,15 @@ fn prune(problem: &Problem, mut choice: Choice) -> Choice {
                         let at = columns.iter().position(|&c| c == column);
                         at.is_none_or(|at| theta[at] < problem.bounds[column].1)
                     });
-                let score = if matters { standard_errors(&rest.blocks, &choice.blocks) } else { f64::NEG_INFINITY };
+                let total = |choice: &Choice| choice.blocks.iter().sum::<f64>();
+                let score = if !matters {
+                    f64::NEG_INFINITY
+                } else if total(&rest) > DECISIVE * total(&choice) {
+                    // Rare events (a limit reached now and then) make standard errors large, but leave no doubt.
+                    f64::INFINITY
+                } else {
+                    standard_errors(&rest.blocks, &choice.blocks)
+                };
                 (score - needed, c, rest)
             })
             .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

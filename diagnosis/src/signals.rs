@@ -8,7 +8,7 @@
 use crate::kernel::{Kernel, apply};
 use gapscope_datasets::{Episode, Uniform, resample};
 use gapscope_dynamics::{Data, Model};
-use gapscope_effects::Motion;
+use gapscope_effects::{Held, Motion};
 
 /// Half-width of the kernel that forms derivatives, s; about 46 Hz.
 const DERIVATIVE_HALF_WIDTH: f64 = 0.010;
@@ -50,6 +50,10 @@ pub struct Signals {
     pub nominal: Vec<Vec<f64>>,
     /// Standard deviation of the noise of each joint's velocity, rad/s or m/s.
     pub velocity_noise: Vec<f64>,
+    /// Weights of the kernel that averages held efforts.
+    pub held: Vec<f64>,
+    /// From when to when something outside may have pushed, s since the start of the episode.
+    pub pushed: Vec<[f64; 2]>,
 }
 
 impl Signals {
@@ -104,6 +108,8 @@ impl Signals {
             tau_rate,
             nominal: vec![Vec::with_capacity(length); n],
             velocity_noise,
+            held: kernel.held.clone(),
+            pushed: Vec::new(),
         };
         signals.fill_nominal(model);
         Some(signals)
@@ -116,7 +122,24 @@ impl Signals {
 
     /// The motion that signatures read.
     pub fn motion<'a>(&'a self, model: &'a Model, standstill: &'a [f64]) -> Motion<'a> {
-        Motion { model, q: &self.q, v: &self.v, a: &self.a, tau: &self.tau, nominal: &self.nominal, standstill }
+        Motion {
+            model,
+            q: &self.q,
+            v: &self.v,
+            a: &self.a,
+            tau: &self.tau,
+            nominal: &self.nominal,
+            held: Some(Held {
+                effort: &self.effort,
+                first: self.first - self.held.len() / 2,
+                stride: self.stride,
+                weights: &self.held,
+            }),
+            dt: self.dt,
+            start: self.first as f64 * self.raw.dt,
+            pushed: &self.pushed,
+            standstill,
+        }
     }
 
     /// Copies sample `k` of a joint-major signal.

@@ -9,8 +9,8 @@ pub const LEAST_ROWS: usize = 50;
 const NEAR_FLOOR: f64 = 1.5;
 /// A gap under this part of the effort's variation is nobody's concern.
 const IMMATERIAL_GAP: f64 = 0.005;
-/// Effects explain the gap if they leave less than this part of its square above the floor.
-const EXPLAINED: f64 = 0.1;
+/// Effects explain the gap if they leave less than this part of its square above the floor: about a twentieth of the gap.
+const EXPLAINED: f64 = 0.003;
 
 /// Squared gap left above the floor over the squared gap before.
 pub fn unexplained_fraction(torque: &Change, floor: f64) -> f64 {

@@ -4,7 +4,9 @@
 //! Source: Åström, Wittenmark, Computer-Controlled Systems (1997) (sampling a system with a time delay).
 
 use crate::effect::{Law, Value, check};
-use crate::{EffectError, Kind, Plant};
+use crate::filter::late;
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 
 /// The time between an effort's stamp in the log and its action.
@@ -33,4 +35,16 @@ impl Law for ActuationDelay {
         plant.actuation.delay += self.delay;
         Ok(())
     }
+}
+
+/// One column at a delay: the effort less the delayed one, over the delay, on every joint. Coefficient: the delay.
+pub(crate) fn signature(motion: &Motion, delay: f64) -> Vec<Column> {
+    vec![changed(motion, delay, |x| late(x, delay, motion.dt))]
+}
+
+/// What an operator on every joint's effort takes away from it, per unit of its parameter.
+pub(crate) fn changed(motion: &Motion, parameter: f64, operator: impl Fn(&[f64]) -> Vec<f64>) -> Column {
+    let less = |x: &Vec<f64>| x.iter().zip(operator(x)).map(|(x, y)| (x - y) / parameter).collect();
+    let rows = motion.tau.iter().map(less).enumerate().collect();
+    Column { rows, at_least: 0.0, at_most: 1.0 }
 }

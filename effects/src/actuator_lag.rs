@@ -3,8 +3,11 @@
 //! T u̇ = τ − u, τ_effective = u.
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), chapter 5 (the drive's current loop).
 
+use crate::actuation_delay::changed;
 use crate::effect::{Law, Value, check};
-use crate::{EffectError, Kind, Plant};
+use crate::filter::first_order;
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 
 /// The effort follows the logged one with a time constant; two lags in a row count as one of their sum.
@@ -39,4 +42,10 @@ impl Law for ActuatorLag {
         plant.actuation.lag += self.time_constant;
         Ok(())
     }
+}
+
+/// One column at a time constant: the effort less the lagged one, over the time constant, on every joint. Coefficient:
+/// the time constant.
+pub(crate) fn signature(motion: &Motion, time_constant: f64) -> Vec<Column> {
+    vec![changed(motion, time_constant, |x| first_order(x, time_constant, motion.dt))]
 }

@@ -8,7 +8,10 @@
 //! which the link alone, at the middle of its range, would vibrate at 20 Hz on the locked motor.
 
 use crate::effect::{Law, Value, check, per_joint};
-use crate::{EffectError, Kind, Plant};
+use crate::filter::side_of_play;
+use crate::joint_elasticity::columns;
+use crate::signature::{Column, EncoderSide};
+use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -41,4 +44,11 @@ impl Law for Backlash {
         }
         Ok(())
     }
+}
+
+/// Two columns: the rotor's, and what the play adds by the encoder's side. Coefficients: J and J · gap where the link's
+/// position is logged, J and gap where the motor's is.
+pub(crate) fn signature(motion: &Motion, joint: usize, side: EncoderSide) -> Vec<Column> {
+    let half: Vec<f64> = side_of_play(&motion.nominal[joint]).iter().map(|s| 0.5 * s).collect();
+    columns(motion, joint, &half, side)
 }

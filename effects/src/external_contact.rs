@@ -5,8 +5,11 @@
 
 use crate::effect::{Law, Value, check};
 use crate::plant::Contact;
-use crate::{EffectError, Kind, Plant};
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Data;
 use glam::DVec3;
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// A constant force on a link during some intervals.
@@ -48,4 +51,35 @@ impl Law for ExternalContact {
         plant.contacts.push(Contact { link, force: DVec3::from_array(self.force), intervals: self.intervals.clone() });
         Ok(())
     }
+}
+
+/// Three columns: what a unit force along x, y and z of the world at the link's centre of mass adds while it pushes, on
+/// every joint. Coefficients: the force.
+pub(crate) fn signature(motion: &Motion, link: usize) -> Vec<Column> {
+    let n = motion.model.dof();
+    let mut data = Data::new(motion.model);
+    let mut jacobian = DMatrix::zeros(6, n);
+    let center = motion.model.joints()[link].inertia.center_of_mass().unwrap_or_default();
+    let mut q = vec![0.0; n];
+    let mut columns: Vec<Column> = (0..3)
+        .map(|_| Column {
+            rows: (0..n).map(|j| (j, vec![0.0; motion.len()])).collect(),
+            at_least: f64::NEG_INFINITY,
+            at_most: f64::INFINITY,
+        })
+        .collect();
+    for k in 0..motion.len() {
+        let time = motion.start + k as f64 * motion.dt;
+        if !motion.pushed.iter().any(|[from, to]| (*from..*to).contains(&time)) {
+            continue;
+        }
+        (0..n).for_each(|j| q[j] = motion.q[j][k]);
+        motion.model.jacobian(&mut data, &q, link, center, &mut jacobian);
+        for (i, column) in columns.iter_mut().enumerate() {
+            for (j, row) in &mut column.rows {
+                row[k] = -jacobian[(i, *j)];
+            }
+        }
+    }
+    columns
 }

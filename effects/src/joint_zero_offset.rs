@@ -4,7 +4,9 @@
 //! Source: Mooring, Roth, Driels, Fundamentals of Manipulator Calibration (1991) (joint offsets).
 
 use crate::effect::{Law, Value, check, per_joint};
-use crate::{EffectError, Kind, Plant};
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Data;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -37,4 +39,40 @@ impl Law for JointZeroOffset {
         }
         Ok(())
     }
+}
+
+/// Step of the derivative, rad or m.
+const STEP: f64 = 1e-4;
+
+/// One column: the negative derivative of the nominal torque with respect to the joint's position, on every joint.
+/// Coefficient: the offset. Exact to first order in the offset.
+pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
+    let ahead = vec![STEP; motion.len()];
+    let still = vec![0.0; motion.len()];
+    vec![moved(motion, joint, [&ahead, &still, &still], 1.0 / STEP, f64::NEG_INFINITY)]
+}
+
+/// What the nominal torque of every joint loses when one joint lies behind its logged motion by a run of position,
+/// velocity and acceleration; times `factor`.
+pub(crate) fn moved(motion: &Motion, joint: usize, behind: [&[f64]; 3], factor: f64, at_least: f64) -> Column {
+    let n = motion.model.dof();
+    let mut data = Data::new(motion.model);
+    let mut torque = [vec![0.0; n], vec![0.0; n]];
+    let [mut q, mut v, mut a] = std::array::from_fn(|_| vec![0.0; n]);
+    let mut rows: Vec<(usize, Vec<f64>)> = (0..n).map(|j| (j, Vec::with_capacity(motion.len()))).collect();
+    for k in 0..motion.len() {
+        for (side, torque) in [-0.5, 0.5].into_iter().zip(&mut torque) {
+            for j in 0..n {
+                (q[j], v[j], a[j]) = (motion.q[j][k], motion.v[j][k], motion.a[j][k]);
+            }
+            q[joint] += side * behind[0][k];
+            v[joint] += side * behind[1][k];
+            a[joint] += side * behind[2][k];
+            motion.model.inverse_dynamics(&mut data, &q, &v, &a, torque);
+        }
+        for (j, row) in &mut rows {
+            row.push(factor * (torque[0][*j] - torque[1][*j]));
+        }
+    }
+    Column { rows, at_least, at_most: f64::INFINITY }
 }

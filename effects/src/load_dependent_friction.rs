@@ -4,7 +4,9 @@
 //! Source: Hamon, Gautier, Garrec, IEEE/RSJ IROS 2010 (dry friction that depends on load and velocity).
 
 use crate::effect::{Law, Value, check, per_joint};
-use crate::{EffectError, Kind, Plant};
+use crate::motion::soft_sign;
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -38,4 +40,15 @@ impl Law for LoadDependentFriction {
         }
         Ok(())
     }
+}
+
+/// A gear that loses more than this locks itself.
+const SELF_LOCKING: f64 = 0.9;
+
+/// One column: the size of the effort times the sign of the speed. Coefficient: μ.
+pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
+    let standstill = motion.standstill[joint];
+    let load = |(v, tau): (&f64, &f64)| tau.abs() * soft_sign(*v, standstill);
+    let column = Column::on(joint, motion.v[joint].iter().zip(&motion.tau[joint]).map(load).collect(), 0.0);
+    vec![Column { at_most: SELF_LOCKING, ..column }]
 }

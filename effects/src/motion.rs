@@ -20,11 +20,49 @@ pub struct Motion<'a> {
     pub tau: &'a [Vec<f64>],
     /// Torque that this motion takes of the nominal robot, damping and friction of its URDF included, N m or N.
     pub nominal: &'a [Vec<f64>],
+    /// What `tau` was made from; `None` where it is the effort itself.
+    pub held: Option<Held<'a>>,
+    /// Time from one sample to the next, s.
+    pub dt: f64,
+    /// Time of the first sample since the start of the episode, s.
+    pub start: f64,
+    /// From when to when something outside may have pushed, s since the start of the episode.
+    pub pushed: &'a [[f64; 2]],
     /// Speed per joint below which it counts as standing, rad/s or m/s.
     pub standstill: &'a [f64],
 }
 
+/// The effort as it was logged, and the kernel that made [`Motion::tau`] of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Held<'a> {
+    /// Efforts at the log's own rate, held from sample to sample, joint-major, N m or N.
+    pub effort: &'a [Vec<f64>],
+    /// Sample at which the kernel of signal 0 begins, and samples from one signal to the next.
+    pub first: usize,
+    /// Samples from one signal to the next.
+    pub stride: usize,
+    /// Weights of the kernel.
+    pub weights: &'a [f64],
+}
+
 impl Motion<'_> {
+    /// What a limit takes off the effort gain · τ + bias of a joint, smoothed like [`Motion::tau`]: a limit acts on every
+    /// sample, and the mean of what is cut is not the cut of the mean.
+    pub fn cut(&self, joint: usize, gain: f64, bias: f64, limit: f64) -> Vec<f64> {
+        let beyond = |tau: f64| {
+            let effort = gain * tau + bias;
+            effort.clamp(-limit, limit) - effort
+        };
+        let Some(held) = &self.held else { return self.tau[joint].iter().map(|&tau| beyond(tau)).collect() };
+        let cut: Vec<f64> = held.effort[joint].iter().map(|&tau| beyond(tau)).collect();
+        (0..self.len())
+            .map(|k| {
+                let from = &cut[held.first + k * held.stride..];
+                held.weights.iter().zip(from).map(|(w, x)| w * x).sum()
+            })
+            .collect()
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.q.first().map_or(0, Vec::len)

@@ -5,8 +5,10 @@
 //! 1995 (LuGre) without Stribeck's rise and damping of the bristles.
 
 use crate::effect::{Law, Value, check, per_joint, value_at};
+use crate::filter::bristle;
 use crate::plant::Bristle;
-use crate::{EffectError, Kind, Plant};
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -45,4 +47,9 @@ impl Law for PreslidingFriction {
         }
         Ok(())
     }
+}
+
+/// One column: the deflection, over its greatest, of a bristle of stiffness κ = σ/f in 1/rad. Coefficient: f.
+pub(crate) fn signature(motion: &Motion, joint: usize, stiffness: f64) -> Vec<Column> {
+    vec![Column::on(joint, bristle(&motion.v[joint], stiffness, motion.dt), 0.0)]
 }

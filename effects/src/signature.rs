@@ -4,11 +4,28 @@
 //! the φ_i are its signature.
 
 use crate::{
-    Armature, CoulombFriction, Effect, JointCoupling, Kind, Motion, ParallelSpring, TorqueBias, TorqueGainError,
-    ViscousFriction, armature, coulomb_friction, gravity_misalignment, joint_coupling, link_inertia_error,
-    parallel_spring, payload, torque_bias, torque_gain_error, viscous_friction,
+    ActuationDelay, ActuatorLag, Armature, Backlash, CoulombFriction, Effect, ExternalContact, JointCoupling,
+    JointElasticity, JointZeroOffset, Kind, LoadDependentFriction, Motion, ParallelSpring, PreslidingFriction,
+    StribeckFriction, ThermalDrift, TorqueBias, TorqueGainError, TorqueRipple, TorqueSaturation, ViscousFriction,
+    actuation_delay, actuator_lag, armature, backlash, coulomb_friction, external_contact, gravity_misalignment,
+    joint_coupling, joint_elasticity, joint_zero_offset, link_inertia_error, load_dependent_friction, parallel_spring,
+    payload, presliding_friction, stribeck_friction, thermal_drift, torque_bias, torque_gain_error, torque_ripple,
+    torque_saturation, viscous_friction,
 };
-use gapscope_dynamics::Model;
+use gapscope_dynamics::{JointKind, Model};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Side of the transmission at which position is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EncoderSide {
+    /// The logged position is the link's.
+    #[default]
+    Link,
+    /// The logged position is the motor's.
+    Motor,
+}
 
 /// What one coefficient adds to the residual torque of the joints it touches.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,49 +44,139 @@ impl Column {
     }
 }
 
-/// An effect at given joints, its linear coefficients still open.
+/// An effect at given joints with the knob that its law is not linear in; its linear coefficients are still open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// The kind.
     pub kind: Kind,
     /// Joints whose law this is; for a payload the leaf that carries it; empty for a robot-wide effect.
     pub joints: Vec<usize>,
-    /// Weight of the second joint of a coupling; 0 for other kinds.
-    pub ratio: f64,
+    /// The knob, 0 for kinds that have none: weight of the second joint of a coupling, Stribeck velocity (rad/s),
+    /// σ/f of bristles (1/rad), time constant of a drift or a lag (s), cycles of a ripple, limit of a saturation (N m),
+    /// delay (s).
+    pub shape: f64,
+    /// Side of the transmission that the log shows, for elasticity and play.
+    pub side: EncoderSide,
 }
 
+/// What a joint does in the logs: the range in which knobs are looked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Range {
+    /// Speed that it hardly exceeds, rad/s (m/s).
+    pub speed: f64,
+    /// From its least to its greatest position, rad (m).
+    pub span: f64,
+    /// Torque that its motion hardly ever takes more of, by the nominal model, N m (N).
+    pub torque: f64,
+    /// Length of the longest episode, s.
+    pub duration: f64,
+}
+
+/// Stribeck velocities over the joint's top speed.
+const STRIBECK: [f64; 5] = [0.03, 0.06, 0.12, 0.25, 0.5];
+/// Travel in which a bristle lets go (f/σ) over the joint's span.
+const BRISTLE: [f64; 5] = [0.0015, 0.005, 0.015, 0.05, 0.15];
+/// Time constants of a drift over the longest episode.
+const DRIFT: [f64; 5] = [0.06, 0.15, 0.35, 0.8, 2.0];
+/// Limits over the torque that the motion takes at most: a limit that is reached is delivered, and no more than it.
+const LIMIT: [f64; 9] = [0.75, 0.85, 0.92, 0.97, 1.0, 1.04, 1.1, 1.2, 1.4];
+/// Delays and lags, s.
+const LATE: [f64; 4] = [0.002, 0.006, 0.012, 0.025];
+/// Cycles of a ripple: at least one and a half over the span; above that by this part of what the span resolves.
+const RIPPLE: (f64, f64, usize) = (1.5, 0.35, 60);
+
 impl Candidate {
-    /// Every candidate that a robot offers: each kind at each joint, payloads at each leaf, couplings of each joint with its parent.
+    /// A candidate without a knob, on the link's side.
+    pub fn new(kind: Kind, joints: Vec<usize>) -> Candidate {
+        Candidate { kind, joints, shape: 0.0, side: EncoderSide::Link }
+    }
+
+    /// Every candidate without a knob to turn that a robot offers: each kind at each joint, payloads at each leaf, couplings
+    /// of each joint with its parent.
     pub fn all(model: &Model) -> Vec<Candidate> {
         let per_joint = [
             Kind::ViscousFriction,
             Kind::CoulombFriction,
+            Kind::LoadDependentFriction,
             Kind::Armature,
             Kind::TorqueGainError,
             Kind::TorqueBias,
             Kind::ParallelSpring,
+            Kind::JointZeroOffset,
         ];
-        let one = |kind, joints| Candidate { kind, joints, ratio: 0.0 };
         let mut all = Vec::new();
         for kind in per_joint {
-            all.extend((0..model.dof()).map(|j| one(kind, vec![j])));
+            all.extend((0..model.dof()).map(|j| Candidate::new(kind, vec![j])));
         }
         let is_leaf = |j: &usize| model.joints().iter().all(|child| child.parent != Some(*j));
         // A leaf's own error and a payload on it are the same ten numbers: told as a payload, by prior.
         all.extend(
-            (0..model.dof()).map(|j| one(if is_leaf(&j) { Kind::Payload } else { Kind::LinkInertiaError }, vec![j])),
+            (0..model.dof())
+                .map(|j| Candidate::new(if is_leaf(&j) { Kind::Payload } else { Kind::LinkInertiaError }, vec![j])),
         );
-        all.push(one(Kind::GravityMisalignment, vec![]));
+        all.push(Candidate::new(Kind::GravityMisalignment, vec![]));
         for (b, joint) in model.joints().iter().enumerate() {
             let Some(a) = joint.parent else { continue };
             // A shared drive element needs the same unit on both sides.
-            if (joint.kind == gapscope_dynamics::JointKind::Prismatic)
-                == (model.joints()[a].kind == gapscope_dynamics::JointKind::Prismatic)
-            {
-                all.extend([1.0, -1.0].map(|ratio| Candidate { kind: Kind::JointCoupling, joints: vec![a, b], ratio }));
+            if (joint.kind == JointKind::Prismatic) == (model.joints()[a].kind == JointKind::Prismatic) {
+                let coupling = |shape| Candidate { shape, ..Candidate::new(Kind::JointCoupling, vec![a, b]) };
+                all.extend([1.0, -1.0].map(coupling));
+            }
+        }
+        for kind in [Kind::JointElasticity, Kind::Backlash] {
+            for side in [EncoderSide::Link, EncoderSide::Motor] {
+                all.extend((0..model.dof()).map(|j| Candidate { side, ..Candidate::new(kind, vec![j]) }));
             }
         }
         all
+    }
+
+    /// Candidates on a grid of their knob, ripple aside; `ranges` has one entry a joint.
+    pub fn knobs(ranges: &[Range]) -> Vec<Candidate> {
+        let mut all = Vec::new();
+        let mut per_joint = |kind, j: usize, shapes: Vec<f64>| {
+            all.extend(shapes.into_iter().map(|shape| Candidate { shape, ..Candidate::new(kind, vec![j]) }));
+        };
+        for (j, range) in ranges.iter().enumerate() {
+            per_joint(Kind::StribeckFriction, j, STRIBECK.map(|part| part * range.speed).to_vec());
+            per_joint(Kind::PreslidingFriction, j, BRISTLE.map(|part| 1.0 / (part * range.span)).to_vec());
+            per_joint(Kind::ThermalDrift, j, DRIFT.map(|part| part * range.duration).to_vec());
+            per_joint(Kind::TorqueSaturation, j, LIMIT.map(|part| part * range.torque).to_vec());
+        }
+        for kind in [Kind::ActuationDelay, Kind::ActuatorLag] {
+            all.extend(LATE.map(|shape| Candidate { shape, ..Candidate::new(kind, vec![]) }));
+        }
+        all.retain(|c| c.shape.is_finite() && c.shape > 0.0);
+        all
+    }
+
+    /// Ripples of one joint on a grid of cycles, fine enough that none falls between.
+    pub fn ripples(joint: usize, range: &Range) -> Vec<Candidate> {
+        let turn = std::f64::consts::TAU / range.span;
+        let (least, step, count) = RIPPLE;
+        (0..count)
+            .map(|i| (least + step * i as f64) * turn)
+            .filter(|cycles| cycles.is_finite())
+            .map(|shape| Candidate { shape, ..Candidate::new(Kind::TorqueRipple, vec![joint]) })
+            .collect()
+    }
+
+    /// Whether the knob is a number that the logs can tell, rather than a choice or nothing.
+    pub fn has_knob(&self) -> bool {
+        matches!(
+            self.kind,
+            Kind::StribeckFriction
+                | Kind::PreslidingFriction
+                | Kind::ThermalDrift
+                | Kind::TorqueSaturation
+                | Kind::TorqueRipple
+        )
+    }
+
+    /// A push on each leaf, for motions that know when something pushed.
+    pub fn contacts(model: &Model) -> Vec<Candidate> {
+        let is_leaf = |j: &usize| model.joints().iter().all(|child| child.parent != Some(*j));
+        (0..model.dof()).filter(is_leaf).map(|j| Candidate::new(Kind::ExternalContact, vec![j])).collect()
     }
 
     /// The signature on a motion.
@@ -77,48 +184,111 @@ impl Candidate {
         match (self.kind, self.joints.as_slice()) {
             (Kind::ViscousFriction, &[j]) => viscous_friction::signature(motion, j),
             (Kind::CoulombFriction, &[j]) => coulomb_friction::signature(motion, j),
+            (Kind::LoadDependentFriction, &[j]) => load_dependent_friction::signature(motion, j),
+            (Kind::StribeckFriction, &[j]) => stribeck_friction::signature(motion, j, self.shape),
+            (Kind::PreslidingFriction, &[j]) => presliding_friction::signature(motion, j, self.shape),
+            (Kind::ThermalDrift, &[j]) => thermal_drift::signature(motion, j, self.shape),
             (Kind::Armature, &[j]) => armature::signature(motion, j),
             (Kind::TorqueGainError, &[j]) => torque_gain_error::signature(motion, j),
             (Kind::TorqueBias, &[j]) => torque_bias::signature(motion, j),
+            (Kind::TorqueSaturation, &[j]) => torque_saturation::signature(motion, j, self.shape),
+            (Kind::TorqueRipple, &[j]) => torque_ripple::signature(motion, j, self.shape),
             (Kind::ParallelSpring, &[j]) => parallel_spring::signature(motion, j),
+            (Kind::JointZeroOffset, &[j]) => joint_zero_offset::signature(motion, j),
+            (Kind::JointElasticity, &[j]) => joint_elasticity::signature(motion, j, self.side),
+            (Kind::Backlash, &[j]) => backlash::signature(motion, j, self.side),
             (Kind::Payload | Kind::LinkInertiaError, &[j]) => payload::signature(motion, j),
-            (Kind::JointCoupling, &[a, b]) => joint_coupling::signature(motion, [a, b], self.ratio),
+            (Kind::JointCoupling, &[a, b]) => joint_coupling::signature(motion, [a, b], self.shape),
             (Kind::GravityMisalignment, _) => gravity_misalignment::signature(motion),
+            (Kind::ExternalContact, &[j]) => external_contact::signature(motion, j),
+            (Kind::ActuationDelay, _) => actuation_delay::signature(motion, self.shape),
+            (Kind::ActuatorLag, _) => actuator_lag::signature(motion, self.shape),
             _ => Vec::new(),
         }
     }
 
-    /// The effect with these coefficients, in the order of [`Candidate::columns`]; `None` where no physical effect has them.
-    pub fn effect(&self, model: &Model, coefficients: &[f64]) -> Option<Effect> {
+    /// The effects with these coefficients, in the order of [`Candidate::columns`]; none where no physical effect has them.
+    /// An elastic drive and play come with their rotor's inertia.
+    pub fn effects(&self, model: &Model, coefficients: &[f64]) -> Vec<Effect> {
         let name = |j: usize| model.joints()[j].name.clone();
-        let single = |value: f64| self.joints.iter().map(|&j| (name(j), value)).collect();
-        Some(match (self.kind, coefficients) {
+        let single = |value: f64| -> BTreeMap<String, f64> { self.joints.iter().map(|&j| (name(j), value)).collect() };
+        let rotor = |inertia: f64| Effect::Armature(Armature { armature: single(inertia) });
+        let one = match (self.kind, coefficients) {
             (Kind::ViscousFriction, &[b]) => Effect::ViscousFriction(ViscousFriction { viscous: single(b) }),
             (Kind::CoulombFriction, &[f]) => Effect::CoulombFriction(CoulombFriction { coulomb: single(f) }),
-            (Kind::Armature, &[i]) => Effect::Armature(Armature { armature: single(i) }),
+            (Kind::LoadDependentFriction, &[mu]) => {
+                Effect::LoadDependentFriction(LoadDependentFriction { load_coefficient: single(mu) })
+            }
+            (Kind::StribeckFriction, &[f, rise]) => Effect::StribeckFriction(StribeckFriction {
+                coulomb: single(f),
+                r#static: single(f + rise),
+                stribeck_velocity: single(self.shape),
+            }),
+            (Kind::PreslidingFriction, &[f]) if f > 0.0 => Effect::PreslidingFriction(PreslidingFriction {
+                coulomb: single(f),
+                bristle_stiffness: single(f * self.shape),
+            }),
+            (Kind::ThermalDrift, &[warm, cold]) if warm + cold > 0.0 => Effect::ThermalDrift(ThermalDrift {
+                coulomb: single(warm + cold),
+                ratio: single(warm / (warm + cold)),
+                time_constant: single(self.shape),
+            }),
+            (Kind::Armature, &[i]) => rotor(i),
             (Kind::TorqueGainError, &[g]) => Effect::TorqueGainError(TorqueGainError { gain: single(1.0 / (1.0 + g)) }),
             (Kind::TorqueBias, &[b]) => Effect::TorqueBias(TorqueBias { bias: single(b) }),
+            (Kind::TorqueSaturation, &[_]) => Effect::TorqueSaturation(TorqueSaturation { limit: single(self.shape) }),
+            (Kind::TorqueRipple, &[c, s]) => Effect::TorqueRipple(TorqueRipple {
+                amplitude: single(c.hypot(s)),
+                cycles: single(self.shape),
+                phase: single(s.atan2(c)),
+            }),
             (Kind::ParallelSpring, &[k, kq]) if k > 0.0 => {
                 Effect::ParallelSpring(ParallelSpring { stiffness: single(k), rest_position: single(kq / k) })
             }
-            (Kind::Payload, c) => {
-                Effect::Payload(payload::from_coefficients(&name(*self.joints.first()?), c.try_into().ok()?)?)
+            (Kind::JointZeroOffset, &[offset]) => Effect::JointZeroOffset(JointZeroOffset { offset: single(offset) }),
+            (Kind::JointElasticity, &[inertia, c]) if c > 0.0 && inertia >= 0.0 => {
+                let stiffness = if self.side == EncoderSide::Link { inertia / c } else { 1.0 / c };
+                if !(stiffness.is_finite() && stiffness > 0.0) {
+                    return Vec::new();
+                }
+                let spring = JointElasticity { stiffness: single(stiffness), damping: BTreeMap::new() };
+                return vec![Effect::JointElasticity(spring), rotor(inertia)];
             }
-            (Kind::LinkInertiaError, c) => Effect::LinkInertiaError(link_inertia_error::from_coefficients(
-                &name(*self.joints.first()?),
-                c.try_into().ok()?,
-            )),
-            (Kind::GravityMisalignment, &[x, y]) => {
-                Effect::GravityMisalignment(gravity_misalignment::from_coefficients(x, y)?)
+            (Kind::Backlash, &[inertia, c]) if c > 0.0 && inertia >= 0.0 => {
+                let gap = if self.side == EncoderSide::Link { c / inertia } else { c };
+                if !gap.is_finite() {
+                    return Vec::new();
+                }
+                return vec![Effect::Backlash(Backlash { gap: single(gap) }), rotor(inertia)];
             }
-            (Kind::JointCoupling, &[viscous, coulomb, armature]) => Effect::JointCoupling(JointCoupling {
-                joints: [name(*self.joints.first()?), name(*self.joints.get(1)?)],
-                ratio: self.ratio,
-                coulomb,
-                viscous,
-                armature,
+            (Kind::ExternalContact, &[x, y, z]) => Effect::ExternalContact(ExternalContact {
+                link: self.joints.first().map(|&j| name(j)).unwrap_or_default(),
+                intervals: Vec::new(),
+                force: [x, y, z],
             }),
-            _ => return None,
-        })
+            (Kind::ActuationDelay, &[delay]) => Effect::ActuationDelay(ActuationDelay { delay }),
+            (Kind::ActuatorLag, &[time_constant]) => Effect::ActuatorLag(ActuatorLag { time_constant }),
+            (Kind::Payload, c) => {
+                let body = self.joints.first().zip(c.try_into().ok());
+                let Some(body) = body.and_then(|(&j, c)| payload::from_coefficients(&name(j), c)) else {
+                    return Vec::new();
+                };
+                Effect::Payload(body)
+            }
+            (Kind::LinkInertiaError, c) => {
+                let Some((&j, c)) = self.joints.first().zip(c.try_into().ok()) else { return Vec::new() };
+                Effect::LinkInertiaError(link_inertia_error::from_coefficients(&name(j), c))
+            }
+            (Kind::GravityMisalignment, &[x, y]) => match gravity_misalignment::from_coefficients(x, y) {
+                Some(tilt) => Effect::GravityMisalignment(tilt),
+                None => return Vec::new(),
+            },
+            (Kind::JointCoupling, &[viscous, coulomb, armature]) if self.joints.len() == 2 => {
+                let joints = [name(self.joints[0]), name(self.joints[1])];
+                Effect::JointCoupling(JointCoupling { joints, ratio: self.shape, coulomb, viscous, armature })
+            }
+            _ => return Vec::new(),
+        };
+        vec![one]
     }
 }

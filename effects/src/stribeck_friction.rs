@@ -4,7 +4,9 @@
 //! Source: Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7) 1994, section 2 (Stribeck curve; here with exponent 2).
 
 use crate::effect::{Law, Value, check, per_joint, value_at};
-use crate::{EffectError, Kind, Plant};
+use crate::motion::soft_sign;
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -51,4 +53,12 @@ impl Law for StribeckFriction {
         }
         Ok(())
     }
+}
+
+/// Two columns at a Stribeck velocity: sign q̇, and the same fading with speed. Coefficients: f, s − f.
+pub(crate) fn signature(motion: &Motion, joint: usize, velocity: f64) -> Vec<Column> {
+    let standstill = motion.standstill[joint];
+    let sign: Vec<f64> = motion.v[joint].iter().map(|&v| soft_sign(v, standstill)).collect();
+    let rise = sign.iter().zip(&motion.v[joint]).map(|(s, v)| s * (-(v / velocity).powi(2)).exp()).collect();
+    vec![Column::on(joint, sign, 0.0), Column::on(joint, rise, 0.0)]
 }

@@ -5,7 +5,9 @@
 //! exponential is that of a drive that warms up as one heat capacity.
 
 use crate::effect::{Law, Value, check, per_joint, value_at};
-use crate::{EffectError, Kind, Plant};
+use crate::motion::soft_sign;
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -53,4 +55,13 @@ impl Law for ThermalDrift {
         }
         Ok(())
     }
+}
+
+/// Two columns at a time constant: sign q̇, and the same fading with time. Coefficients: ratio · f, (1 − ratio) f.
+pub(crate) fn signature(motion: &Motion, joint: usize, time_constant: f64) -> Vec<Column> {
+    let standstill = motion.standstill[joint];
+    let sign: Vec<f64> = motion.v[joint].iter().map(|&v| soft_sign(v, standstill)).collect();
+    let time = |k: usize| motion.start + k as f64 * motion.dt;
+    let cold = sign.iter().enumerate().map(|(k, s)| s * (-time(k) / time_constant).exp()).collect();
+    vec![Column::on(joint, sign, 0.0), Column::on(joint, cold, 0.0)]
 }

@@ -5,7 +5,8 @@
 
 use crate::effect::{Law, Value, check, per_joint, value_at};
 use crate::plant::Ripple;
-use crate::{EffectError, Kind, Plant};
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -50,4 +51,10 @@ impl Law for TorqueRipple {
         }
         Ok(())
     }
+}
+
+/// Two columns at a number of cycles: −sin and −cos of cycles · q. Coefficients: amplitude · cos phase, amplitude · sin phase.
+pub(crate) fn signature(motion: &Motion, joint: usize, cycles: f64) -> Vec<Column> {
+    let wave = |f: fn(f64) -> f64| motion.q[joint].iter().map(|q| -f(cycles * q)).collect();
+    [wave(f64::sin), wave(f64::cos)].into_iter().map(|x| Column::on(joint, x, f64::NEG_INFINITY)).collect()
 }

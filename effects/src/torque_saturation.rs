@@ -4,7 +4,8 @@
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), chapter 5 (limits of drives).
 
 use crate::effect::{Law, Value, check, per_joint};
-use crate::{EffectError, Kind, Plant};
+use crate::signature::Column;
+use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -37,4 +38,13 @@ impl Law for TorqueSaturation {
         }
         Ok(())
     }
+}
+
+/// Where a coefficient of one, which is what a limit has, ends to be plausible.
+const COEFFICIENT: (f64, f64) = (0.5, 1.5);
+
+/// One column at a limit: the effort beyond it. Coefficient: one.
+pub(crate) fn signature(motion: &Motion, joint: usize, limit: f64) -> Vec<Column> {
+    let beyond = motion.cut(joint, 1.0, 0.0, limit).iter().map(|x| -x).collect();
+    vec![Column { at_most: COEFFICIENT.1, ..Column::on(joint, beyond, COEFFICIENT.0) }]
 }

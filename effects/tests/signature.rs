@@ -55,7 +55,7 @@ impl Samples {
 
     fn motion<'a>(&'a self, model: &'a Model) -> Motion<'a> {
         let (q, v, a, tau, nominal) = (&self.q, &self.v, &self.a, &self.tau, &self.nominal);
-        Motion { model, q, v, a, tau, nominal, standstill: &self.still }
+        Motion { model, q, v, a, tau, nominal, held: None, dt: DT, start: 0.0, pushed: &[], standstill: &self.still }
     }
 
     /// Residual of a plant at every sample, joint-major.
@@ -139,7 +139,7 @@ fn columns_are_what_the_effect_adds(model: &Model, draw: &mut Draw) {
                 assert!((column.at_least..=column.at_most).contains(theta), "{candidate:?}: the test draws {theta}");
                 assert!(column.rows.iter().all(|(j, x)| *j < model.dof() && x.len() == SAMPLES));
             }
-            let effect = candidate.effect(model, &theta).unwrap();
+            let effect = candidate.effects(model, &theta).pop().unwrap();
             assert_eq!(effect.kind(), candidate.kind);
             let added = samples.added(model, std::slice::from_ref(&effect));
             let error = largest_difference(&added, &predicted(&columns, &theta, model.dof()));
@@ -185,7 +185,7 @@ fn columns_of_several_effects_add_up() {
         let theta = coefficients(&mut draw, &model, candidate, &columns);
         let part = predicted(&columns, &theta, 7);
         sum.iter_mut().zip(&part).for_each(|(s, p)| s.iter_mut().zip(p).for_each(|(s, p)| *s += p));
-        effects.push(candidate.effect(&model, &theta).unwrap());
+        effects.push(candidate.effects(&model, &theta).pop().unwrap());
     }
     let error = largest_difference(&samples.added(&model, &effects), &sum);
     assert!(error < 1e-10 * (1.0 + largest(&sum)), "{error:e}");
@@ -197,12 +197,12 @@ fn tilt_is_exact_to_second_order_in_the_angle() {
         let mut draw = Draw::new(100 + seed as u64);
         let model = robot(name);
         let samples = Samples::new(&mut draw, &model);
-        let candidate = Candidate { kind: Kind::GravityMisalignment, joints: vec![], ratio: 0.0 };
+        let candidate = Candidate::new(Kind::GravityMisalignment, vec![]);
         let columns = candidate.columns(&samples.motion(&model));
         let error = |angle: f64| {
             let tilt = GravityMisalignment { roll: 0.8 * angle, pitch: -0.6 * angle };
             let g = tilt.gravity();
-            let back = candidate.effect(&model, &[g.x, g.y]).unwrap();
+            let back = candidate.effects(&model, &[g.x, g.y]).pop().unwrap();
             let Effect::GravityMisalignment(back) = back else { panic!("{back:?}") };
             assert!((back.roll - tilt.roll).abs() < 1e-12 && (back.pitch - tilt.pitch).abs() < 1e-12);
             let added = samples.added(&model, &[Effect::GravityMisalignment(tilt)]);
@@ -217,9 +217,9 @@ fn tilt_is_exact_to_second_order_in_the_angle() {
 #[test]
 fn no_tilt_beyond_a_right_angle() {
     let model = robot("arm6");
-    let candidate = Candidate { kind: Kind::GravityMisalignment, joints: vec![], ratio: 0.0 };
+    let candidate = Candidate::new(Kind::GravityMisalignment, vec![]);
     for (x, y) in [(9.9, 0.0), (0.0, -9.9), (8.0, 8.0), (f64::NAN, 0.0), (f64::INFINITY, 0.0)] {
-        assert_eq!(candidate.effect(&model, &[x, y]), None, "({x}, {y})");
+        assert!(candidate.effects(&model, &[x, y]).is_empty(), "({x}, {y})");
     }
 }
 
@@ -227,7 +227,7 @@ fn no_tilt_beyond_a_right_angle() {
 fn coefficients_that_no_effect_has_give_none() {
     let model = robot("arm6");
     let make = |kind, joints: &[usize], theta: &[f64]| {
-        Candidate { kind, joints: joints.to_vec(), ratio: 1.0 }.effect(&model, theta)
+        Candidate { shape: 1.0, ..Candidate::new(kind, joints.to_vec()) }.effects(&model, theta).pop()
     };
     assert_eq!(make(Kind::ParallelSpring, &[1], &[0.0, 2.0]), None, "a spring without stiffness has no rest position");
     assert_eq!(make(Kind::ParallelSpring, &[1], &[-3.0, 2.0]), None);
@@ -251,8 +251,9 @@ fn coefficients_at_their_bounds_are_effects_that_the_plant_takes() {
             let columns = candidate.columns(&samples.motion(&model));
             let least: Vec<f64> =
                 columns.iter().map(|c| if c.at_least.is_finite() { c.at_least } else { 0.0 }).collect();
-            if let Some(effect) = candidate.effect(&model, &least) {
-                Plant::new(&model, &[effect], DT).unwrap_or_else(|e| panic!("{candidate:?} {least:?}: {e}"));
+            {
+                let effects = candidate.effects(&model, &least);
+                Plant::new(&model, &effects, DT).unwrap_or_else(|e| panic!("{candidate:?} {least:?}: {e}"));
             }
         }
     }
@@ -285,7 +286,7 @@ fn couplings_join_neighbours_of_one_unit() {
         for c in Candidate::all(&model).iter().filter(|c| c.kind == Kind::JointCoupling) {
             assert_eq!(model.joints()[c.joints[1]].parent, Some(c.joints[0]));
             assert_eq!(slides(c.joints[0]), slides(c.joints[1]));
-            assert_eq!(c.ratio.abs(), 1.0);
+            assert_eq!(c.shape.abs(), 1.0);
         }
     }
 }

@@ -8,6 +8,7 @@ mod actuation;
 mod drive;
 mod friction;
 mod jacobian;
+mod residual;
 mod state;
 mod step;
 
@@ -250,56 +251,6 @@ impl Plant {
     pub(crate) fn add_inertia(&mut self, joint: usize, inertia: Inertia) {
         let sum = self.model.joints()[joint].inertia.add(&inertia);
         self.model = self.model.clone().with_inertia(joint, sum);
-    }
-
-    /// Residual torque on a measured motion: the effort that was logged less the effort that the plant would have logged.
-    ///
-    /// r = τ − [ID(q, q̇, q̈) + K q + friction + rotor inertia − bias] / gain, N m (N), written to `residual`.
-    /// Below the speed `standstill[j]` dry friction is a set: it takes up as much of the rest as it can hold.
-    /// One sample knows nothing of the past: delay, lag and contact are left out, joints count as rigid, bristles as
-    /// sliding and drives as warm. Slices have length n. Allocates nothing.
-    pub fn residual(&mut self, q: &[f64], v: &[f64], a: &[f64], tau: &[f64], standstill: &[f64], residual: &mut [f64]) {
-        let s = &mut self.scratch;
-        for j in 0..q.len() {
-            s.delivered[j] = self.actuation.at_joint(j, tau[j]);
-            s.q[j] = q[j] - self.offset[j];
-        }
-        self.model.inverse_dynamics(&mut self.data, &s.q[..q.len()], v, a, residual);
-        for j in 0..q.len() {
-            residual[j] = s.delivered[j] + self.spring_torque[j] - residual[j] - self.stiffness[j] * s.q[j];
-        }
-        for ripple in &self.ripples {
-            residual[ripple.joint] += ripple.torque(s.q[ripple.joint]);
-        }
-        for drive in &self.drives {
-            residual[drive.joint] -= drive.rotor * a[drive.joint];
-        }
-        for direction in &self.directions {
-            let force = direction.viscous * direction.along(v) + direction.inertia * direction.along(a);
-            for &(j, weight) in &direction.parts {
-                residual[j] -= weight * force;
-            }
-        }
-        let sliding = |bound: f64, speed: f64, band: f64, hold: f64| {
-            let limit = bound.max(0.0);
-            if speed.abs() >= band { bound * speed.signum() } else { hold.clamp(-limit, limit) }
-        };
-        for direction in &self.directions {
-            let speed = direction.along(v);
-            let band: f64 = direction.parts.iter().map(|&(j, weight)| weight.abs() * standstill[j]).sum();
-            let square: f64 = direction.parts.iter().map(|&(_, weight)| weight * weight).sum();
-            let bound = direction.bound(speed, f64::INFINITY, &s.delivered);
-            let force = sliding(bound, speed, band, direction.along(residual) / square);
-            for &(j, weight) in &direction.parts {
-                residual[j] -= weight * force;
-            }
-        }
-        for &Bristle { joint, coulomb, .. } in &self.bristles {
-            residual[joint] -= sliding(coulomb, v[joint], standstill[joint], residual[joint]);
-        }
-        for (rest, gain) in residual.iter_mut().zip(&self.actuation.gain) {
-            *rest /= gain;
-        }
     }
 
     /// Smallest squared pivot of the mass matrix at `q` over its largest diagonal entry; near zero where no acceleration

@@ -28,7 +28,7 @@ pub(super) struct Scratch {
     pub(super) v_end: Vec<f64>,
     force: Vec<f64>,
     /// Mean torque of the contacts over the step, N m, n, at the position where the dynamics are evaluated.
-    contact: Vec<f64>,
+    pub(super) contact: Vec<f64>,
     /// Torque from outside the plant, N m, n; held over the step.
     outside: Vec<f64>,
 }
@@ -118,7 +118,7 @@ impl Plant {
     }
 
     /// Jᵀ F of the contacts, averaged over the step from `time` on; in `scratch.contact`.
-    fn contact_torque(&mut self, time: f64) {
+    pub(super) fn contact_torque(&mut self, time: f64) {
         let n = self.model.dof();
         let s = &mut self.scratch;
         s.contact.fill(0.0);

@@ -1,0 +1,130 @@
+//! From a choice on a grid to the exact law: knobs turned to where they fit best, and torque that is not linear in the
+//! coefficients accounted for.
+
+use crate::band::Band;
+use crate::corrected::{plant_pushed, residual};
+use crate::estimate::Fit;
+use crate::problem::{Problem, Term};
+use crate::signals::Signals;
+use gapscope_dynamics::Model;
+use gapscope_effects::{Candidate, EffectError, Kind, Plant};
+use rayon::prelude::*;
+
+/// Rounds, at most.
+const ROUNDS: usize = 8;
+/// Relative change of a knob at which it has settled.
+const SETTLED: f64 = 2e-3;
+/// Least and greatest of a knob over where it began: beyond them it is another law.
+const KNOB: (f64, f64) = (0.2, 5.0);
+
+/// The logs that a problem is made from.
+#[derive(Clone, Copy)]
+pub struct Data<'a> {
+    /// The nominal robot.
+    pub model: &'a Model,
+    /// Signals of every episode.
+    pub signals: &'a [Signals],
+    /// Rows.
+    pub band: &'a Band,
+    /// Speed per joint below which it stands.
+    pub standstill: &'a [f64],
+    /// Joints that move.
+    pub moving: &'a [bool],
+    /// Noise floor of each joint.
+    pub noise: &'a [f64],
+}
+
+impl Data<'_> {
+    /// A problem of some terms.
+    pub fn problem(&self, terms: Vec<Term>) -> Problem {
+        Problem::new(self.model, self.signals, self.band, self.standstill, self.moving, terms, self.noise)
+    }
+
+    /// What the effects of a fit add to the residual beyond their linear signature: `[episode][joint][signal]`.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn curvature(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
+        let effects = fit.effects(problem, self.model);
+        let side = problem.side(&fit.set);
+        self.signals
+            .par_iter()
+            .map(|s| {
+                let mut with = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
+                let mut exact = residual(&mut with, self.model, s, self.standstill, 0.0);
+                let mut nominal = Plant::nominal(self.model, s.dt);
+                let nominal = residual(&mut nominal, self.model, s, self.standstill, 0.0);
+                let motion = s.motion(self.model, self.standstill);
+                // exact = nominal − Σ θφ + curvature
+                for (x, n) in exact.iter_mut().zip(&nominal) {
+                    x.iter_mut().zip(n).for_each(|(x, n)| *x -= n);
+                }
+                for &c in &fit.set {
+                    let (_, theta) = fit.own(problem, c);
+                    for (column, theta) in problem.entries[c].candidate.columns(&motion).iter().zip(theta) {
+                        for (j, torque) in &column.rows {
+                            exact[*j].iter_mut().zip(torque).for_each(|(x, t)| *x += theta * t);
+                        }
+                    }
+                }
+                Ok(exact)
+            })
+            .collect()
+    }
+
+    /// The problem of some candidates alone, linear about the parameters that fit best, and the fit (Gauss–Newton in the
+    /// knobs, chords in what else bends).
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn refine(&self, candidates: &[Candidate]) -> Result<(Problem, Fit), EffectError> {
+        let mut terms: Vec<Term> = candidates.iter().map(|c| Term { candidate: c.clone(), tangent_at: None }).collect();
+        let set: Vec<usize> = (0..terms.len()).collect();
+        let mut curvature: Option<Vec<Vec<Vec<f64>>>> = None;
+        let mut round = 0;
+        loop {
+            let mut problem = self.problem(terms.clone());
+            if let Some(curvature) = &curvature {
+                problem.bend(self.signals, self.band, self.standstill, curvature);
+            }
+            let fit = Fit::on_all(&problem, &set);
+            let mut change = 0.0f64;
+            for (i, term) in terms.iter_mut().enumerate() {
+                let (_, theta) = fit.own(&problem, i);
+                let entry = &problem.entries[i];
+                let before = term.candidate.shape;
+                if matches!(term.candidate.kind, Kind::ActuationDelay | Kind::ActuatorLag) {
+                    // The signature is a secant: its coefficient is where the next one ends.
+                    term.candidate.shape = theta[0].clamp(1e-5, 0.5);
+                    change = change.max((term.candidate.shape / before - 1.0).abs());
+                } else if term.candidate.has_knob() {
+                    if let (true, Some((by, rest))) = (entry.tangent, theta.split_last()) {
+                        let (low, high) = (KNOB.0 * candidates[i].shape, KNOB.1 * candidates[i].shape);
+                        term.candidate.shape = (before + by).clamp(low, high);
+                        term.tangent_at = Some(rest.to_vec());
+                        change = change.max((term.candidate.shape / before - 1.0).abs());
+                    } else {
+                        let one = term.candidate.kind == Kind::TorqueSaturation;
+                        term.tangent_at = Some(if one { vec![1.0] } else { theta });
+                        change = 1.0;
+                    }
+                }
+            }
+            // Three rounds settle what bends on its own.
+            if round >= ROUNDS || (round >= 3 && change < SETTLED) {
+                return Ok((problem, fit));
+            }
+            let mut at = fit.clone();
+            if change > 0.0 {
+                // Curvature belongs to the knobs as they will be.
+                problem = self.problem(terms.iter().map(|t| Term { tangent_at: None, ..t.clone() }).collect());
+                if let Some(curvature) = &curvature {
+                    problem.bend(self.signals, self.band, self.standstill, curvature);
+                }
+                at = Fit::on_all(&problem, &set);
+            }
+            curvature = Some(self.curvature(&problem, &at)?);
+            round += 1;
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! Operators on signals of a uniform grid that carry memory from sample to sample.
+
+/// A signal `delay` s later, linear between samples; what lies before the first sample is taken as the first.
+pub(crate) fn late(x: &[f64], delay: f64, dt: f64) -> Vec<f64> {
+    let steps = (delay / dt).max(0.0);
+    let (whole, fraction) = (steps.floor() as usize, steps.fract());
+    let at = |k: usize, back: usize| x[k.saturating_sub(back)];
+    (0..x.len()).map(|k| at(k, whole) + fraction * (at(k, whole + 1) - at(k, whole))).collect()
+}
+
+/// Response of a first-order lag to a signal that is linear between samples, exact; it starts as if the signal had been
+/// constant before.
+pub(crate) fn first_order(x: &[f64], time_constant: f64, dt: f64) -> Vec<f64> {
+    if time_constant <= 0.0 {
+        return x.to_vec();
+    }
+    let decay = (-dt / time_constant).exp();
+    let mut out = Vec::with_capacity(x.len());
+    let mut y = x.first().copied().unwrap_or(0.0);
+    for (k, &now) in x.iter().enumerate() {
+        if k > 0 {
+            // On a ramp of slope s the response trails by s T; what differs from that decays.
+            let trail = time_constant * (now - x[k - 1]) / dt;
+            y = now - trail + (y - x[k - 1] + trail) * decay;
+        }
+        out.push(y);
+    }
+    out
+}
+
+/// Second derivative by central differences; at the ends that of the neighbour.
+pub(crate) fn second_derivative(x: &[f64], dt: f64) -> Vec<f64> {
+    differences(x, |before, now, after| (after - 2.0 * now + before) / (dt * dt))
+}
+
+/// First derivative by central differences; at the ends that of the neighbour.
+pub(crate) fn first_derivative(x: &[f64], dt: f64) -> Vec<f64> {
+    differences(x, |before, _, after| (after - before) / (2.0 * dt))
+}
+
+fn differences(x: &[f64], of: impl Fn(f64, f64, f64) -> f64) -> Vec<f64> {
+    if x.len() < 3 {
+        return vec![0.0; x.len()];
+    }
+    let inner = x.windows(3).map(|w| of(w[0], w[1], w[2]));
+    let mut out = Vec::with_capacity(x.len());
+    out.push(0.0);
+    out.extend(inner);
+    out.push(0.0);
+    out[0] = out[1];
+    let last = out.len() - 1;
+    out[last] = out[last - 1];
+    out
+}
+
+/// A signal through a raised cosine of the given half-width, s; the window shrinks towards the ends.
+pub(crate) fn smooth(x: &[f64], half_width: f64, dt: f64) -> Vec<f64> {
+    let reach = (half_width / dt).round() as usize;
+    let weights: Vec<f64> =
+        (0..=reach).map(|i| 0.5 + 0.5 * (std::f64::consts::PI * i as f64 / (reach + 1) as f64).cos()).collect();
+    (0..x.len())
+        .map(|k| {
+            let reach = reach.min(k).min(x.len() - 1 - k);
+            let (mut sum, mut total) = (weights[0] * x[k], weights[0]);
+            for (i, w) in weights.iter().enumerate().take(reach + 1).skip(1) {
+                sum += w * (x[k - i] + x[k + i]);
+                total += 2.0 * w;
+            }
+            sum / total
+        })
+        .collect()
+}
+
+/// Deflection of a bristle over its greatest one, -1 to 1, along a measured motion that starts with it relaxed:
+/// Dahl's law dw/dt = κ (v - abs(v) w) with κ = σ/f in 1/rad, by the implicit Euler rule.
+pub(crate) fn bristle(v: &[f64], stiffness: f64, dt: f64) -> Vec<f64> {
+    let mut w = 0.0;
+    v.iter()
+        .map(|v| {
+            w = (w + dt * stiffness * v) / (1.0 + dt * stiffness * v.abs());
+            w
+        })
+        .collect()
+}
+
+/// Torque under this part of its root mean square does not say on which side of its play a gear is.
+const UNDECIDED: f64 = 0.05;
+
+/// On which side of its play a gear is under a torque: 1, -1, or between while the torque passes through zero.
+pub(crate) fn side_of_play(torque: &[f64]) -> Vec<f64> {
+    let rms = (torque.iter().map(|t| t * t).sum::<f64>() / torque.len().max(1) as f64).sqrt();
+    let width = (UNDECIDED * rms).max(f64::MIN_POSITIVE);
+    torque.iter().map(|t| (t / width).clamp(-1.0, 1.0)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    const DT: f64 = 0.002;
+
+    fn sine(omega: f64, phase: f64) -> Vec<f64> {
+        (0..2000).map(|k| (omega * k as f64 * DT + phase).sin()).collect()
+    }
+
+    #[test]
+    fn a_delay_turns_phase_and_a_lag_turns_phase_and_loses_gain() {
+        let omega = 12.0;
+        let delayed = late(&sine(omega, 0.0), 0.0071, DT);
+        let expected = sine(omega, -omega * 0.0071);
+        for (a, b) in delayed.iter().zip(&expected).skip(20) {
+            assert_relative_eq!(a, b, epsilon = 1e-4);
+        }
+        let lagged = first_order(&sine(omega, 0.0), 0.02, DT);
+        let turn = omega * 0.02f64;
+        for (a, b) in lagged.iter().zip(sine(omega, -turn.atan())).skip(200) {
+            assert_relative_eq!(*a, b / (1.0 + turn * turn).sqrt(), epsilon = 1e-4);
+        }
+    }
+
+    #[test]
+    fn derivatives_of_a_sine() {
+        let omega = 6.0;
+        let x = sine(omega, 0.3);
+        let (first, second) = (first_derivative(&x, DT), second_derivative(&x, DT));
+        for (k, x) in x.iter().enumerate().take(1999).skip(1) {
+            assert_relative_eq!(second[k], -omega * omega * x, epsilon = 1e-2);
+            assert_relative_eq!(first[k], omega * (omega * k as f64 * DT + 0.3).cos(), epsilon = 1e-2);
+        }
+    }
+
+    #[test]
+    fn a_bristle_is_a_spring_first_and_slides_then() {
+        let v = vec![0.1; 4000];
+        let w = bristle(&v, 50.0, DT);
+        assert_relative_eq!(w[0], 50.0 * 0.1 * DT, max_relative = 0.02);
+        assert_relative_eq!(w[3999], 1.0, epsilon = 1e-6);
+    }
+
+    #[test]
+    fn smoothing_keeps_lines_inside_and_constants_to_the_ends() {
+        let line: Vec<f64> = (0..300).map(|k| k as f64).collect();
+        for (a, b) in smooth(&line, 0.05, DT).iter().zip(&line) {
+            assert_relative_eq!(a, b, epsilon = 1e-9);
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! What a plant leaves of a measured motion: the effort that was logged less the effort that the plant would have logged.
+
+use super::Plant;
+use crate::Motion;
+use crate::filter::{bristle, first_derivative, first_order, late, second_derivative, side_of_play, smooth};
+use nalgebra::DMatrix;
+
+/// Wind-up of a drive is smoothed to this part of its resonance before it is differentiated: beyond it the torque that
+/// winds the spring cannot be read off a rigid link's motion.
+const BELOW_RESONANCE: f64 = 0.6;
+/// The same, Hz, at most: robots do not move on purpose beyond it.
+const FASTEST: f64 = 12.0;
+/// Times that the torque which winds a spring is computed again on the link's own motion, where the motor's is logged.
+const ROUNDS: usize = 2;
+
+/// What one sample needs to know beyond itself.
+#[derive(Default)]
+struct Past<'a> {
+    /// Time since the start of the episode, s; infinite for a warm drive.
+    time: f64,
+    /// Deflection of each bristle over its greatest one; `None` for bristles that slide.
+    bristles: Option<&'a [f64]>,
+}
+
+/// Wind-up of a drive along a run, with its derivatives.
+struct WindUp {
+    joint: usize,
+    rotor: f64,
+    angle: Vec<f64>,
+    rate: Vec<f64>,
+    acceleration: Vec<f64>,
+}
+
+impl Plant {
+    /// Residual torque of one sample of a measured motion.
+    ///
+    /// r = τ − [ID(q, q̇, q̈) + K q + friction + rotor inertia − bias] / gain, N m (N), written to `residual`.
+    /// Below the speed `standstill[j]` dry friction is a set: it takes up as much of the rest as it can hold.
+    /// One sample knows nothing of the past: delay, lag and contact are left out, joints count as rigid, bristles as
+    /// sliding and drives as warm; [`Plant::residuals`] knows them. Slices have length n. Allocates nothing.
+    pub fn residual(&mut self, q: &[f64], v: &[f64], a: &[f64], tau: &[f64], standstill: &[f64], residual: &mut [f64]) {
+        self.rest(q, v, a, tau, standstill, &Past { time: f64::INFINITY, bristles: None }, residual);
+        for (rest, gain) in residual.iter_mut().zip(&self.actuation.gain) {
+            *rest /= gain;
+        }
+    }
+
+    /// Residual torque of a whole measured run, joint-major like its signals, N m (N): [`Plant::residual`] with all that a
+    /// sample does not show. Efforts are delayed and lagged, bristles bend, drives warm up and contacts push as the run has it.
+    ///
+    /// An elastic drive's motor turns ahead of its link by δ = τ_l/k (δ lags by d/k under damping) and half its play on the
+    /// side that it pushes, where τ_l is the torque that the link takes: the rotor then takes J δ̈ more than with a rigid
+    /// drive (Spong, J. Dyn. Sys. 109(4) 1987). Where the motor's position is logged, the link's is that less δ.
+    /// Valid below the drive's resonance.
+    pub fn residuals(&mut self, motion: &Motion) -> Vec<Vec<f64>> {
+        let tau: Vec<Vec<f64>> = motion
+            .tau
+            .iter()
+            .enumerate()
+            .map(|(j, x)| {
+                let (gain, bias, limit) = (self.actuation.gain[j], self.actuation.bias[j], self.actuation.limit[j]);
+                let mut x = x.clone();
+                if limit.is_finite() {
+                    x.iter_mut().zip(motion.cut(j, gain, bias, limit)).for_each(|(x, cut)| *x += cut / gain);
+                }
+                first_order(&late(&x, self.actuation.delay, motion.dt), self.actuation.lag, motion.dt)
+            })
+            .collect();
+        let bristles: Vec<Vec<f64>> =
+            self.bristles.iter().map(|b| bristle(&motion.v[b.joint], b.stiffness / b.coulomb, motion.dt)).collect();
+        let mut rest = self.run(motion, &tau, &bristles, &[]);
+        let turns = |plant: &Plant, d: usize| plant.drives[d].rotor > 0.0 || plant.motor_encoders;
+        if (0..self.drives.len()).any(|d| turns(self, d)) {
+            let mut wind_up = self.wind_ups(motion, &tau, &rest);
+            if self.motor_encoders {
+                for _ in 0..ROUNDS {
+                    rest = self.run(motion, &tau, &bristles, &wind_up);
+                    wind_up = self.wind_ups(motion, &tau, &rest);
+                }
+            } else {
+                for drive in &wind_up {
+                    for (rest, acceleration) in rest[drive.joint].iter_mut().zip(&drive.acceleration) {
+                        *rest -= drive.rotor * acceleration;
+                    }
+                }
+            }
+        }
+        for (row, gain) in rest.iter_mut().zip(&self.actuation.gain) {
+            row.iter_mut().for_each(|rest| *rest /= gain);
+        }
+        rest
+    }
+
+    /// One pass over a run, the gain not yet divided by, with links behind their logged motors by `wind_up`.
+    fn run(&mut self, motion: &Motion, tau: &[Vec<f64>], bristles: &[Vec<f64>], wind_up: &[WindUp]) -> Vec<Vec<f64>> {
+        let n = motion.q.len();
+        let mut out = vec![Vec::with_capacity(motion.len()); n];
+        let [mut q, mut v, mut a, mut effort, mut rest] = std::array::from_fn(|_| vec![0.0; n]);
+        let mut bent = vec![0.0; bristles.len()];
+        for k in 0..motion.len() {
+            for j in 0..n {
+                (q[j], v[j], a[j], effort[j]) = (motion.q[j][k], motion.v[j][k], motion.a[j][k], tau[j][k]);
+            }
+            for drive in wind_up {
+                q[drive.joint] -= drive.angle[k];
+                v[drive.joint] -= drive.rate[k];
+                a[drive.joint] -= drive.acceleration[k];
+            }
+            bent.iter_mut().zip(bristles).for_each(|(b, run)| *b = run[k]);
+            let past = Past { time: motion.start + k as f64 * motion.dt, bristles: Some(&bent) };
+            self.rest(&q, &v, &a, &effort, motion.standstill, &past, &mut rest);
+            for drive in wind_up {
+                // The rotor turns as the motor does, ahead of the link.
+                rest[drive.joint] -= drive.rotor * drive.acceleration[k];
+            }
+            out.iter_mut().zip(&rest).for_each(|(out, rest)| out.push(*rest));
+        }
+        out
+    }
+
+    /// Wind-up of every drive under the torque that its link takes: the effort delivered less the rest and the rotor's part.
+    fn wind_ups(&mut self, motion: &Motion, tau: &[Vec<f64>], rest: &[Vec<f64>]) -> Vec<WindUp> {
+        let n = motion.q.len();
+        let middle: Vec<f64> = (0..n).map(|j| motion.q[j].get(motion.len() / 2).copied().unwrap_or(0.0)).collect();
+        let mut mass = DMatrix::zeros(n, n);
+        self.model.mass_matrix(&mut self.data, &middle, &mut mass);
+        self.drives
+            .iter()
+            .map(|drive| {
+                let j = drive.joint;
+                let torque: Vec<f64> = (0..motion.len())
+                    .map(|k| self.actuation.at_joint(j, tau[j][k]) - rest[j][k] - drive.rotor * motion.a[j][k])
+                    .collect();
+                let resonance = (drive.stiffness / mass[(j, j)]).sqrt() / std::f64::consts::TAU;
+                let wound: Vec<f64> = torque.iter().map(|t| t / drive.stiffness).collect();
+                let mut angle = first_order(&wound, drive.damping / drive.stiffness, motion.dt);
+                if drive.half_gap > 0.0 {
+                    angle.iter_mut().zip(side_of_play(&torque)).for_each(|(a, side)| *a += drive.half_gap * side);
+                }
+                // −3 dB of the raised cosine lies at 0.36 over its half-width.
+                let angle = smooth(&angle, 0.36 / (BELOW_RESONANCE * resonance).min(FASTEST), motion.dt);
+                WindUp {
+                    joint: j,
+                    rotor: drive.rotor,
+                    rate: first_derivative(&angle, motion.dt),
+                    acceleration: second_derivative(&angle, motion.dt),
+                    angle,
+                }
+            })
+            .collect()
+    }
+
+    /// Residual of one sample before the gain; `tau` has gone through delay and lag already.
+    #[expect(clippy::too_many_arguments, reason = "one sample's signals")]
+    fn rest(
+        &mut self,
+        q: &[f64],
+        v: &[f64],
+        a: &[f64],
+        tau: &[f64],
+        standstill: &[f64],
+        past: &Past<'_>,
+        residual: &mut [f64],
+    ) {
+        let s = &mut self.scratch;
+        for j in 0..q.len() {
+            s.delivered[j] = self.actuation.at_joint(j, tau[j]);
+            s.q[j] = q[j] - self.offset[j];
+        }
+        self.model.inverse_dynamics(&mut self.data, &s.q[..q.len()], v, a, residual);
+        if past.time.is_finite() && !self.contacts.is_empty() {
+            self.contact_torque(past.time);
+            residual.iter_mut().zip(&self.scratch.contact).for_each(|(r, torque)| *r -= torque);
+        }
+        let s = &mut self.scratch;
+        for j in 0..q.len() {
+            residual[j] = s.delivered[j] + self.spring_torque[j] - residual[j] - self.stiffness[j] * s.q[j];
+        }
+        for ripple in &self.ripples {
+            residual[ripple.joint] += ripple.torque(s.q[ripple.joint]);
+        }
+        for drive in &self.drives {
+            residual[drive.joint] -= drive.rotor * a[drive.joint];
+        }
+        for direction in &self.directions {
+            let force = direction.viscous * direction.along(v) + direction.inertia * direction.along(a);
+            for &(j, weight) in &direction.parts {
+                residual[j] -= weight * force;
+            }
+        }
+        let sliding = |bound: f64, speed: f64, band: f64, hold: f64| {
+            let limit = bound.max(0.0);
+            if speed.abs() >= band { bound * speed.signum() } else { hold.clamp(-limit, limit) }
+        };
+        for direction in &self.directions {
+            let speed = direction.along(v);
+            let band: f64 = direction.parts.iter().map(|&(j, weight)| weight.abs() * standstill[j]).sum();
+            let square: f64 = direction.parts.iter().map(|&(_, weight)| weight * weight).sum();
+            let bound = direction.bound(speed, past.time, &s.delivered);
+            let force = sliding(bound, speed, band, direction.along(residual) / square);
+            for &(j, weight) in &direction.parts {
+                residual[j] -= weight * force;
+            }
+        }
+        for (i, b) in self.bristles.iter().enumerate() {
+            residual[b.joint] -= match past.bristles {
+                Some(bent) => b.coulomb * bent[i],
+                None => sliding(b.coulomb, v[b.joint], standstill[b.joint], residual[b.joint]),
+            };
+        }
+    }
+}

@@ -6,7 +6,8 @@
 use crate::error::ResidualError;
 use crate::orthogonal::coefficients;
 use crate::ridge::{cross, solve};
-use faer::Mat;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use gapscope_network::{Normal, ShapeError};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -23,7 +24,7 @@ pub struct Alarm {
 
 impl Default for Alarm {
     fn default() -> Self {
-        Self { neurons: 512, seed: 0 }
+        Self { neurons: 384, seed: 0 }
     }
 }
 
@@ -105,14 +106,16 @@ pub fn explained_share(
         };
         let moments: Vec<Mat<f64>> = (0..parts.len()).map(|m| cross(&blocks[m], &rest[m], parts[m].len())).collect();
         let Some(weights) = fit(k, &parts, &grams, &moments, &rest) else { continue };
-        let outputs: Vec<Vec<f64>> = blocks.iter().map(|f| apply(f, &weights)).collect();
-        let outputs = match &phi {
-            Some(phi) => subtract(&outputs, phi, &projection(&outputs, phi, k)),
-            None => outputs,
+        let output = match &phi {
+            Some(phi) => {
+                let all: Vec<Vec<f64>> = blocks.iter().map(|f| apply(f, &weights)).collect();
+                subtract(&all, phi, &projection(&all, phi, k)).swap_remove(k)
+            }
+            None => apply(&blocks[k], &weights),
         };
         for (i, &row) in parts[k].iter().enumerate() {
             for j in 0..n {
-                let (target, output) = (rest[k][i * n + j], outputs[k][i * n + j]);
+                let (target, output) = (rest[k][i * n + j], output[i * n + j]);
                 prediction[row * n + j] = output;
                 before[j] += target * target;
                 after[j] += (target - output) * (target - output);
@@ -219,10 +222,10 @@ fn fit(
 /// F W, `[rows][n]`.
 fn apply(features: &[f64], weights: &Mat<f64>) -> Vec<f64> {
     let (h, n) = (weights.nrows(), weights.ncols());
-    let mut out = Vec::with_capacity(features.len() / h * n);
-    for row in features.chunks_exact(h) {
-        out.extend((0..n).map(|j| row.iter().enumerate().map(|(i, f)| f * weights[(i, j)]).sum::<f64>()));
-    }
+    let rows = features.len() / h;
+    let mut out = vec![0.0; rows * n];
+    let into = MatMut::from_row_major_slice_mut(&mut out, rows, n);
+    matmul(into, Accum::Replace, MatRef::from_row_major_slice(features, rows, h), weights, 1.0, Par::Seq);
     out
 }
 

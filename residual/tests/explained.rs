@@ -5,7 +5,6 @@ use gapscope_residual::{Alarm, explained_share};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use std::time::Instant;
 
 const JOINTS: usize = 7;
 const ROWS: usize = 2000;
@@ -58,15 +57,11 @@ fn an_effect_is_explained_and_its_noise_is_not() {
     let clean = targets(&features, 0.0, law);
     let mean_square = clean.iter().map(|t| t * t).sum::<f64>() / clean.len() as f64;
     let noise = 0.3 * mean_square.sqrt();
-    let start = Instant::now();
     let found = explained_share(&features, &targets(&features, noise, law), &folds, None, &Alarm::default()).unwrap();
-    let seconds = start.elapsed().as_secs_f64();
     let most = 1.0 / 1.09;
     assert!(found.share > 0.75 * most && found.share < 1.01 * most, "{}", found.share);
     assert!(found.by_target.iter().all(|s| *s > 0.5), "{:?}", found.by_target);
     assert_eq!(found.prediction.len(), ROWS * JOINTS);
-    // Bound for loaded machines; about a quarter of a second alone.
-    assert!(seconds < 5.0, "{seconds} s");
 }
 
 #[test]

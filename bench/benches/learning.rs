@@ -19,7 +19,7 @@ fn arm() -> Model {
 fn network<T: Real>() -> Mlp<T> {
     let mut network = Mlp::new(&SIZES, Activation::Tanh, Init::Xavier, 1).unwrap();
     let last = network.parameters().len() - 129 * 14;
-    network.parameters_mut()[last..].iter_mut().for_each(|p| *p = *p * T::from_f64(1e-4));
+    network.parameters_mut()[last..].iter_mut().for_each(|p: &mut T| *p = T::from_f64(1e-4 * p.to_f64()));
     network
 }
 

@@ -2,7 +2,7 @@
 
 use faer::traits::RealField;
 use std::fmt::{Debug, Display};
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// `f32` or `f64`.
 pub trait Real:
@@ -20,6 +20,7 @@ pub trait Real:
     + Div<Output = Self>
     + Neg<Output = Self>
     + AddAssign
+    + SubAssign
     + serde::Serialize
     + serde::de::DeserializeOwned
     + sealed::Vector

@@ -199,7 +199,7 @@ fn adam_body<T: Real, const FUSED: bool>(
     for ((p, g), (m, s)) in parameters.iter_mut().zip(gradient).zip(moments) {
         *m = times_plus::<T, FUSED>(first, *m, one_first * *g);
         *s = times_plus::<T, FUSED>(second, *s, one_second * *g * *g);
-        *p = *p - step * *m / times_plus::<T, FUSED>(s.root(), scale, epsilon);
+        *p -= step * *m / times_plus::<T, FUSED>(s.root(), scale, epsilon);
     }
 }
 

@@ -43,10 +43,10 @@ pub fn model() -> Result<Model> {
     Ok(robots::model("arm7").context("the 7-joint arm is built in")??.model)
 }
 
-/// The robot: viscous and Coulomb friction and a payload that its model lacks, `size` times 2 N m s/rad, 1.5 N m (less on
-/// the joints of the wrist) and 1.5 kg.
+/// The robot: viscous and Coulomb friction and a payload that its model lacks, `size` times 2 N m s/rad, 1.5 N m (much
+/// less on the joints of the wrist, whose inertia is small) and 1.5 kg.
 pub fn truth(model: &Model, size: f64) -> Result<Plant> {
-    let share = [1.0, 1.0, 0.8, 0.8, 0.4, 0.4, 0.3];
+    let share = [1.0, 1.0, 0.8, 0.8, 0.1, 0.1, 0.02];
     let each = |most: f64| model.joints().iter().zip(share).map(|(j, s)| (j.name.clone(), most * size * s)).collect();
     let effects = [
         Effect::ViscousFriction(ViscousFriction { viscous: each(2.0) }),

@@ -48,7 +48,7 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
     write_bytes(path, text.as_bytes())
 }
 
-/// As [`write`], of bytes.
+/// As [`write()`], of bytes.
 ///
 /// # Errors
 /// The file or its folder cannot be written.

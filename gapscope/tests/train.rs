@@ -20,7 +20,7 @@ fn folder() -> tempfile::TempDir {
     let effect = Effect::ViscousFriction(ViscousFriction { viscous });
     let recipe = Recipe { seconds: 12.0, rate: 200.0, ..Recipe::default() };
     let log = generate(&model, &[effect], 3, &recipe, "log.csv").unwrap();
-    write_csv(&dir.path().join("log.csv"), &log, true).unwrap();
+    write_csv(dir.path().join("log.csv"), &log, true).unwrap();
     std::fs::write(dir.path().join("robot.urdf"), robots::double_pendulum()).unwrap();
     dir
 }

@@ -22,7 +22,7 @@ fn motion(seed: u64) -> (Vec<f64>, Vec<usize>) {
         let t = 0.02 * i as f64;
         let derivative = |k: i32, w: &[f64; 6]| {
             let wave =
-                |a: f64, f: f64, p: f64| a * f.powi(k) * (f * t + p + f64::from(k) * 1.570_796_326_794_896_6).sin();
+                |a: f64, f: f64, p: f64| a * f.powi(k) * (f * t + p + f64::from(k) * std::f64::consts::FRAC_PI_2).sin();
             wave(0.3 * w[0], w[1], w[2]) + wave(0.2 * w[3], w[4], w[5])
         };
         for k in 0..3 {

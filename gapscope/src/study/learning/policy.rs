@@ -85,7 +85,7 @@ pub fn run(budget: &Budget) -> Result<Findings> {
         title: "On-policy against off-policy data",
         method: format!(
             "The arm and mismatch (size 1) of the study of [samples](samples.md). On-policy: the states that a computed-torque controller visits while it \
-             tracks random Fourier motions, a new one every 4 s. Off-policy: states drawn evenly from the box of that study. Tested on {TEST} steps of each kind, \
+             tracks random Fourier motions, a new one every 4 s: N = 400 is one motion. Off-policy: states drawn evenly from the box of that study. Tested on {TEST} steps of each kind, \
              other motions and other draws. {} steps of training, median of {}. The picture shows the error on-policy.",
             budget.steps, budget.repeats
         ),

@@ -16,9 +16,12 @@ const TEST: usize = 2000;
 /// Joints that the wrong models lack.
 const MISSING: [usize; 2] = [3, 1];
 
+/// A simulator given by a closure.
+type Simulator = StepFn<Box<dyn FnMut(&mut [f64], &[f64])>>;
+
 /// The arm as someone would have it who took joint `missing` for a weld: the others move as a 6-joint arm, this one
 /// coasts.
-fn without(missing: usize) -> Result<impl Fn() -> StepFn<Box<dyn FnMut(&mut [f64], &[f64])>> + Sync> {
+fn without(missing: usize) -> Result<impl Fn() -> Simulator + Sync> {
     let name = format!("joint{}", missing + 1);
     let rest: Model = Model::from_urdf_locking(robots::arm7(), &[name.as_str()])?.model;
     Ok(move || {

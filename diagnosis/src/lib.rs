@@ -31,5 +31,5 @@ mod verdict;
 pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};
 pub use diagnose::{Outcome, Progress, diagnose};
 pub use evaluate::{Predictions, evaluate};
-pub use rollout::{BoundGrowth, ModelRollouts, RolloutError, RolloutOptions, Rollouts, rollouts};
 pub use gapscope_effects::EncoderSide;
+pub use rollout::{BoundGrowth, ModelRollouts, RolloutError, RolloutOptions, Rollouts, rollouts};

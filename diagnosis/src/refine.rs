@@ -12,6 +12,17 @@ use rayon::prelude::*;
 
 /// Rounds, at most.
 const ROUNDS: usize = 8;
+/// Rounds, at least, where some torque bends with the coefficients.
+const ROUNDS_FOR_BENT: usize = 6;
+/// Kinds whose torque bends with their own parameters or with those of others.
+const BENT: [Kind; 6] = [
+    Kind::Payload,
+    Kind::GravityMisalignment,
+    Kind::TorqueGainError,
+    Kind::JointZeroOffset,
+    Kind::JointElasticity,
+    Kind::Backlash,
+];
 /// Relative change of a knob at which it has settled.
 const SETTLED: f64 = 2e-3;
 /// Least and greatest of a knob over where it began: beyond them it is another law.
@@ -81,6 +92,8 @@ impl Data<'_> {
         let mut terms: Vec<Term> = candidates.iter().map(|c| Term { candidate: c.clone(), tangent_at: None }).collect();
         let set: Vec<usize> = (0..terms.len()).collect();
         let mut curvature: Option<Vec<Vec<Vec<f64>>>> = None;
+        let bends = candidates.iter().any(|c| BENT.contains(&c.kind));
+        let least = if bends { ROUNDS_FOR_BENT } else { 1 };
         let mut round = 0;
         loop {
             let mut problem = self.problem(terms.clone());
@@ -110,8 +123,7 @@ impl Data<'_> {
                     }
                 }
             }
-            // Three rounds settle what bends on its own.
-            if round >= ROUNDS || (round >= 3 && change < SETTLED) {
+            if round >= ROUNDS || (round >= least && change < SETTLED) {
                 return Ok((problem, fit));
             }
             let mut at = fit.clone();

@@ -185,7 +185,12 @@ pub fn rivals(problem: &Problem, choice: &Choice) -> Vec<Rival> {
         .map(|without| {
             let rest: Vec<usize> =
                 choice.set.iter().copied().filter(|&c| problem.entries[c].candidate.kind != without).collect();
-            let rival = search(problem, &rest, &[without], RIVAL_MOVES);
+            // A law that holds this one is no rival to it: with the rest of it at nothing it is this one. A spring is, as its
+            // rest position may lie anywhere.
+            let holds = |(rich, simple): &&(Kind, Kind)| *simple == without && *rich != Kind::ParallelSpring;
+            let mut forbidden = vec![without];
+            forbidden.extend(NESTED.iter().filter(holds).map(|(rich, _)| *rich));
+            let rival = prune(problem, search(problem, &rest, &forbidden, RIVAL_MOVES));
             let same = moved(problem, choice, &rival).iter().zip(&problem.least).all(|(moved, least)| moved <= least);
             let probability = if same {
                 // They differ by less than what neither explains: only simplicity and prior speak, and never for the rival.

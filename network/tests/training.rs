@@ -1,5 +1,5 @@
 //! Training: reproducible, stops early, folds its normalisation, refuses what it cannot use.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gapscope_network::{
     Activation, Examples, Init, Mlp, Pass, Real, ShapeError, TrainError, TrainSettings, Trained, train,

@@ -40,12 +40,12 @@ const COMMON: [Kind; 6] = [
     Kind::Payload,
 ];
 /// A torque this many times its noise is no artefact of it.
-const CLEAR: f64 = 12.0;
+const CLEAR: f64 = 8.0;
 /// Time about a push that counts neither way, s.
 const EDGE: f64 = 0.15;
 /// Power of the explained part of the gap by which confidence falls: what leaves much of the gap may be the nearest thing
 /// that the catalogue has to a cause that it has not.
-const MISFIT: i32 = 2;
+const MISFIT: i32 = 4;
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
 
@@ -260,8 +260,9 @@ impl Logs<'_> {
         let data = self.data(&noise);
         let mut candidates = Candidate::all(self.model);
         let mut ranges = ranges(&self.signals, self.model.dof());
-        for (range, noise) in ranges.iter_mut().zip(&noise) {
+        for (j, range) in ranges.iter_mut().enumerate() {
             // A cut of an effort that is mostly noise would explain that noise by itself.
+            let noise = self.signals.iter().map(|s| s.effort_noise[j]).fold(0.0, f64::max);
             if range.torque < CLEAR * noise {
                 range.torque = 0.0;
             }

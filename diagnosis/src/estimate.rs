@@ -8,6 +8,9 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 
+/// What sampling, integration and the laws themselves leave of any parameter, as a part of it; no number of rows averages
+/// that out.
+const SYSTEMATIC: f64 = 1e-3;
 /// Step of the numerical derivative from coefficients to parameters, in standard errors.
 const STEP: f64 = 1e-3;
 
@@ -109,6 +112,7 @@ impl Fit {
                 })
                 .collect();
             for (v, estimate) in estimates.iter().enumerate() {
+                let size = estimate.value.iter().map(|x| x * x).sum::<f64>().sqrt();
                 let half: Vec<f64> = (0..estimate.value.len())
                     .map(|component| {
                         let gradient: Vec<f64> = slopes
@@ -123,7 +127,7 @@ impl Fit {
                             .flat_map(|i| (0..at.len()).map(move |k| (i, k)))
                             .map(|(i, k)| gradient[i] * own[(i, k)] * gradient[k])
                             .sum();
-                        quantile * variance.max(0.0).sqrt()
+                        (quantile * variance.max(0.0).sqrt()).hypot(SYSTEMATIC * size)
                     })
                     .collect();
                 insert(&mut parameters, model, estimate, &half);

@@ -50,6 +50,8 @@ pub struct Signals {
     pub nominal: Vec<Vec<f64>>,
     /// Standard deviation of the noise of each joint's velocity, rad/s or m/s.
     pub velocity_noise: Vec<f64>,
+    /// Standard deviation of the noise of each joint's logged effort, sample by sample, N m or N.
+    pub effort_noise: Vec<f64>,
     /// Weights of the kernel that averages held efforts.
     pub held: Vec<f64>,
     /// From when to when something outside may have pushed, s since the start of the episode.
@@ -92,7 +94,8 @@ impl Signals {
         // The derivative of a held signal sits half a sample late, like the signal itself; fine for an alignment column.
         let tau_rate = each(&rate_weights, &effort, kernel.reach + 1);
         let gain = kernel.first.iter().map(|w| w * w).sum::<f64>().sqrt();
-        let velocity_noise = raw.position.iter().map(|x| position_noise(x) * gain).collect();
+        let velocity_noise = raw.position.iter().map(|x| white_noise(x) * gain).collect();
+        let effort_noise = effort.iter().map(|x| white_noise(x)).collect();
         let signal_dt = dt * stride as f64;
         let mut signals = Signals {
             name: episode.name.clone(),
@@ -108,6 +111,7 @@ impl Signals {
             tau_rate,
             nominal: vec![Vec::with_capacity(length); n],
             velocity_noise,
+            effort_noise,
             held: kernel.held.clone(),
             pushed: Vec::new(),
         };
@@ -187,7 +191,7 @@ pub fn standstill(signals: &[Signals], joints: usize) -> Vec<f64> {
 }
 
 /// Standard deviation of white noise on a smooth signal, from the median size of its fourth differences (1, −4, 6, −4, 1).
-fn position_noise(x: &[f64]) -> f64 {
+fn white_noise(x: &[f64]) -> f64 {
     let mut size: Vec<f64> =
         x.windows(5).map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs()).filter(|d| *d > 0.0).collect();
     if size.is_empty() {

@@ -41,6 +41,8 @@ const COMMON: [Kind; 6] = [
 ];
 /// A torque this many times its noise is no artefact of it.
 const CLEAR: f64 = 8.0;
+/// Kinds side by side, at most, that are believed where some of them have knobs.
+const KINDS_TOGETHER: usize = 4;
 /// Time about a push that counts neither way, s.
 const EDGE: f64 = 0.15;
 /// Power of the explained part of the gap by which confidence falls: what leaves much of the gap may be the nearest thing
@@ -250,7 +252,18 @@ impl Logs<'_> {
         }
     }
 
+    /// The choice among all kinds, or among the linear ones alone where that many of all kinds leave much: flexible laws side
+    /// by side then bend to what none of them is.
     fn choose_without(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let chosen = self.choose_among(forbidden, progress)?;
+        if select::kinds(&chosen.all, &chosen.choice.set).len() <= KINDS_TOGETHER {
+            return Ok(chosen);
+        }
+        let flexible = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k) || forbidden.contains(k));
+        self.choose_among(&flexible.collect::<Vec<_>>(), progress)
+    }
+
+    fn choose_among(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let residuals: Vec<Vec<Vec<f64>>> = self
             .signals
             .par_iter()

@@ -41,13 +41,13 @@ const COMMON: [Kind; 6] = [
 ];
 /// A torque this many times its noise is no artefact of it.
 const CLEAR: f64 = 8.0;
-/// Kinds side by side, at most, that are believed where some of them have knobs.
-const KINDS_TOGETHER: usize = 4;
 /// Time about a push that counts neither way, s.
 const EDGE: f64 = 0.15;
 /// Power of the explained part of the gap by which confidence falls: what leaves much of the gap may be the nearest thing
 /// that the catalogue has to a cause that it has not.
 const MISFIT: i32 = 4;
+/// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
+const MANY: usize = 3;
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
 
@@ -172,6 +172,14 @@ fn ranges(signals: &[Signals], joints: usize) -> Vec<Range> {
         .collect()
 }
 
+fn median(mut x: Vec<f64>) -> f64 {
+    if x.is_empty() {
+        return 0.0;
+    }
+    let middle = x.len() / 2;
+    *x.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// Puts the coefficients of a fit with tangents on the same candidates without them.
 fn carry(from: &Fit, with: &Problem, to: &Problem, fit: &mut Fit) {
     for c in 0..to.entries.len() {
@@ -211,7 +219,7 @@ impl Logs<'_> {
         let mut candidates = Candidate::all(self.model);
         candidates.retain(|c| COMMON.contains(&c.kind));
         let terms = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
-        let problem = self.data(&noise).problem(terms);
+        let problem = self.data(&noise).problem(terms, &COMMON);
         let rest = problem.robust_rest(self.band.rows.len());
         let bare = gap::at_rows(&self.band, &nominal, n);
         let mut pushed = contact::stretches(&self.signals, &self.band, &bare);
@@ -230,37 +238,41 @@ impl Logs<'_> {
 
     /// The problem of all candidates, the set chosen from it, and the problem of that set alone at its exact parameters.
     ///
-    /// What the normal equations promise is held against the torque that the plant really predicts on held-out data: a set
-    /// that makes the gap larger there is no explanation, and the next choice does without the kinds that bend.
+    /// What the normal equations promise is held against the torque that the plant really predicts on held-out data. Where
+    /// many kinds stand together or leave much, flexible laws may have bent to what none of them is: then the linear kinds
+    /// alone have their turn, and stay if they predict as well with no more of them. A set that makes the gap larger is no explanation: then the next choice
+    /// does without the kinds that promise most.
     fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let weights = gap::weights(&self.signals, &self.moving);
         let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, |_| true)), &weights);
+        let left = |chosen: &Chosen| -> Result<f64, EffectError> {
+            Ok(rms(&self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows))
+        };
         let before = rms(&self.nominal_rows());
-        let mut forbidden: &[Kind] = &[];
-        loop {
-            let chosen = self.choose_without(forbidden, progress)?;
-            let set = &chosen.fit.set;
-            if set.is_empty() || rms(&self.held_out(&chosen.exact, set, false)?.rows) < before {
-                return Ok(chosen);
+        let chosen = self.choose_among(&[], progress)?;
+        let mut best = (left(&chosen)?, chosen);
+        let flexible: Vec<Kind> = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k)).collect();
+        let bends = |chosen: &Chosen| chosen.exact.entries.iter().any(|e| flexible.contains(&e.candidate.kind));
+        let floor = gap::weighted_rms(&best.1.noise.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &weights);
+        let count = |chosen: &Chosen| select::kinds(&chosen.exact, &chosen.fit.set).len();
+        let many = count(&best.1) >= MANY;
+        if bends(&best.1) && (many || verdict::leaves_much(best.0, before, floor)) {
+            let linear = self.choose_among(&flexible, progress)?;
+            let after = left(&linear)?;
+            if after <= best.0 && count(&linear) <= count(&best.1) {
+                best = (after, linear);
             }
-            if !forbidden.is_empty() {
-                let choice = select::evaluate(&chosen.all, Vec::new());
-                let (exact, fit) = self.data(&chosen.noise).refine(&[])?;
-                return Ok(Chosen { choice, exact, fit, ..chosen });
-            }
-            forbidden = &INERTIAL;
         }
-    }
-
-    /// The choice among all kinds, or among the linear ones alone where that many of all kinds leave much: flexible laws side
-    /// by side then bend to what none of them is.
-    fn choose_without(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        let chosen = self.choose_among(forbidden, progress)?;
-        if select::kinds(&chosen.all, &chosen.choice.set).len() <= KINDS_TOGETHER {
+        if best.1.fit.set.is_empty() || best.0 < before {
+            return Ok(best.1);
+        }
+        let chosen = self.choose_among(&INERTIAL, progress)?;
+        if chosen.fit.set.is_empty() || left(&chosen)? < before {
             return Ok(chosen);
         }
-        let flexible = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k) || forbidden.contains(k));
-        self.choose_among(&flexible.collect::<Vec<_>>(), progress)
+        let choice = select::evaluate(&chosen.all, Vec::new());
+        let (exact, fit) = self.data(&chosen.noise).refine(&[])?;
+        Ok(Chosen { choice, exact, fit, ..chosen })
     }
 
     fn choose_among(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
@@ -281,15 +293,23 @@ impl Logs<'_> {
             }
         }
         candidates.extend(Candidate::knobs(&ranges));
+        // A limit that cuts most of an effort explains what it has cut away.
+        let typical: Vec<f64> = (0..self.model.dof())
+            .map(|j| {
+                let size: Vec<f64> = self.signals.iter().flat_map(|s| s.effort[j].iter()).map(|t| t.abs()).collect();
+                median(size)
+            })
+            .collect();
+        candidates.retain(|c| c.kind != Kind::TorqueSaturation || c.shape > typical[c.joints[0]]);
         candidates.extend(screen::ripples(&data, &ranges, &residuals));
         if self.signals.iter().any(|s| !s.pushed.is_empty()) {
             candidates.extend(Candidate::contacts(self.model));
         }
         candidates.retain(|c| !forbidden.contains(&c.kind));
         let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
-        let mut all = data.problem(candidates.iter().map(open).collect());
+        let mut all = data.problem(candidates.iter().map(open).collect(), &Kind::LINEAR);
         progress("choosing effects", 0.2);
-        let mut choice = select::choose(&all, &[], &[]);
+        let mut choice = select::choose(&mut all, &self.band, &[]);
         let mut round = 0;
         loop {
             progress("refining effects", 0.3 + 0.08 * round as f64);
@@ -303,12 +323,12 @@ impl Logs<'_> {
             }
             all.replace(self.model, &self.signals, &self.band, &self.still, &changes);
             let at: Vec<usize> = (0..exact.entries.len()).collect();
-            let plain = data.problem(exact.entries.iter().map(|e| open(&e.candidate)).collect());
+            let plain = data.problem(exact.entries.iter().map(|e| open(&e.candidate)).collect(), &Kind::ALL);
             let mut plain_fit = Fit::on_all(&plain, &at);
             carry(&fit, &exact, &plain, &mut plain_fit);
             let curvature = data.curvature(&plain, &plain_fit)?;
             all.bend(&self.signals, &self.band, &self.still, &curvature);
-            let again = select::choose(&all, &choice.set, &[]);
+            let again = select::choose(&mut all, &self.band, &choice.set);
             let same = again.set == choice.set;
             choice = again;
             if same {

@@ -155,7 +155,9 @@ pub struct Problem {
     pub bounds: Vec<(f64, f64)>,
     /// Typical effort of each joint, N m or N.
     pub scale: Vec<f64>,
-    /// Standard deviation of what no candidate explains, N m or N, with the immaterial part as its least value.
+    /// Noise floor of each joint, N m or N.
+    noise: Vec<f64>,
+    /// Standard deviation of what the weighing set does not explain, N m or N, with the immaterial part as its least value.
     pub sigma: Vec<f64>,
     /// Least root mean square torque by which an effect must move a joint to be named on its account, N m or N.
     pub least: Vec<f64>,
@@ -172,8 +174,8 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Sets up the problem: signatures of every candidate on every episode, filtered; weights from a fit of all of them.
-    /// `noise` is the noise floor of each joint, N m or N.
+    /// Sets up the problem: signatures of every candidate on every episode, filtered. `noise` is the noise floor of each
+    /// joint, N m or N. Before use it must be weighed.
     pub fn new(
         model: &Model,
         signals: &[Signals],
@@ -260,10 +262,11 @@ impl Problem {
         for row in &band.rows {
             fold_of_block[row.block] = row.fold;
         }
-        let mut problem = Problem {
+        Problem {
             entries,
             bounds,
             scale,
+            noise: noise.to_vec(),
             sigma: vec![1.0; n],
             least: vec![0.0; n],
             correlation: vec![1.0; n],
@@ -274,18 +277,7 @@ impl Problem {
             training: Vec::new(),
             held: Vec::new(),
             total: Normal::zeros(p),
-        };
-        problem.weigh(band);
-        for entry in &mut problem.entries {
-            entry.rank = rank(&problem.total.gram, &entry.columns);
         }
-        problem.least = (0..n)
-            .map(|j| {
-                let misfit = (problem.sigma[j].powi(2) - noise[j].powi(2)).max(0.0).sqrt();
-                (OF_NOISE * noise[j]).max(misfit).max(MATERIAL * IMMATERIAL * problem.scale[j])
-            })
-            .collect();
-        problem
     }
 
     /// What a fit of all candidates, deaf to what stands far out, leaves at each row: `[joint][row]`; 0 where a row is out.
@@ -332,15 +324,21 @@ impl Problem {
         self.blocks.iter().filter(|b| b.square > 0.0).count()
     }
 
-    /// Weights from what a fit of all candidates leaves: size and correlation of each joint's rest, outliers down-weighted.
-    fn weigh(&mut self, band: &Band) {
+    /// Weights from what a fit of some entries leaves: size and correlation of each joint's rest, outliers down-weighted.
+    ///
+    /// Not of all entries: laws that bend, many to a joint, together fit the noise too, and the scale would be rounding.
+    pub fn weigh(&mut self, band: &Band, set: &[usize]) {
         self.sigma = self.scale.clone();
+        self.joints.iter_mut().for_each(|rows| rows.robust.fill(1.0));
         self.accumulate(band);
-        let all: Vec<usize> = (0..self.bounds.len()).collect();
+        for entry in &mut self.entries {
+            entry.rank = rank(&self.total.gram, &entry.columns);
+        }
+        let columns = self.columns(set);
         for _ in 0..5 {
-            let theta = self.solve_unbounded(&all, &self.total);
+            let theta = self.solve_unbounded(&columns, &self.total);
             for (j, rows) in self.joints.iter_mut().enumerate() {
-                let rest = rows.residual(&all, &theta);
+                let rest = rows.residual(&columns, &theta);
                 if rest.len() < 8 {
                     continue;
                 }
@@ -360,7 +358,8 @@ impl Problem {
                     };
                 }
                 let clipped: Vec<f64> = rest.iter().zip(&rows.robust).map(|(r, w)| r * w).collect();
-                let free = rows.rows.len().saturating_sub(rows.columns.len()).max(1);
+                let used = rows.columns.iter().filter(|c| columns.contains(c)).count();
+                let free = rows.rows.len().saturating_sub(used).max(1);
                 self.sigma[j] = (clipped.iter().map(|r| r * r).sum::<f64>() / free as f64).sqrt().max(least);
                 self.correlation[j] = correlation_time(&clipped);
             }
@@ -371,6 +370,12 @@ impl Problem {
                 *weight /= 1.0 + (INEXACT * target / sigma).powi(2);
             }
         }
+        self.least = (0..self.joints.len())
+            .map(|j| {
+                let misfit = (self.sigma[j].powi(2) - self.noise[j].powi(2)).max(0.0).sqrt();
+                (OF_NOISE * self.noise[j]).max(misfit).max(MATERIAL * IMMATERIAL * self.scale[j])
+            })
+            .collect();
         self.accumulate(band);
     }
 

@@ -15,7 +15,8 @@ const ROUNDS: usize = 8;
 /// Rounds, at least, where some torque bends with the coefficients.
 const ROUNDS_FOR_BENT: usize = 6;
 /// Kinds whose torque bends with their own parameters or with those of others.
-const BENT: [Kind; 6] = [
+const BENT: [Kind; 7] = [
+    Kind::LoadDependentFriction,
     Kind::Payload,
     Kind::GravityMisalignment,
     Kind::TorqueGainError,
@@ -27,6 +28,8 @@ const BENT: [Kind; 6] = [
 const SETTLED: f64 = 2e-3;
 /// Least and greatest of a knob over where it began: beyond them it is another law.
 const KNOB: (f64, f64) = (0.2, 5.0);
+/// The same for a limit: far below where it is reached it would cut away what it is to explain.
+const LIMIT: (f64, f64) = (0.8, 1.5);
 
 /// The logs that a problem is made from.
 #[derive(Clone, Copy)]
@@ -46,9 +49,14 @@ pub struct Data<'a> {
 }
 
 impl Data<'_> {
-    /// A problem of some terms.
-    pub fn problem(&self, terms: Vec<Term>) -> Problem {
-        Problem::new(self.model, self.signals, self.band, self.standstill, self.moving, terms, self.noise)
+    /// A problem of some terms, weighed by what all those of some kinds leave.
+    pub fn problem(&self, terms: Vec<Term>, weighed_by: &[Kind]) -> Problem {
+        let mut problem =
+            Problem::new(self.model, self.signals, self.band, self.standstill, self.moving, terms, self.noise);
+        let weighs = |c: &usize| weighed_by.contains(&problem.entries[*c].candidate.kind);
+        let set: Vec<usize> = (0..problem.entries.len()).filter(weighs).collect();
+        problem.weigh(self.band, &set);
+        problem
     }
 
     /// What the effects of a fit add to the residual beyond their linear signature: `[episode][joint][signal]`.
@@ -96,7 +104,7 @@ impl Data<'_> {
         let least = if bends { ROUNDS_FOR_BENT } else { 1 };
         let mut round = 0;
         loop {
-            let mut problem = self.problem(terms.clone());
+            let mut problem = self.problem(terms.clone(), &Kind::ALL);
             if let Some(curvature) = &curvature {
                 problem.bend(self.signals, self.band, self.standstill, curvature);
             }
@@ -112,7 +120,8 @@ impl Data<'_> {
                     change = change.max((term.candidate.shape / before - 1.0).abs());
                 } else if term.candidate.has_knob() {
                     if let (true, Some((by, rest))) = (entry.tangent, theta.split_last()) {
-                        let (low, high) = (KNOB.0 * candidates[i].shape, KNOB.1 * candidates[i].shape);
+                        let (low, high) = if term.candidate.kind == Kind::TorqueSaturation { LIMIT } else { KNOB };
+                        let (low, high) = (low * candidates[i].shape, high * candidates[i].shape);
                         term.candidate.shape = (before + by).clamp(low, high);
                         term.tangent_at = Some(rest.to_vec());
                         change = change.max((term.candidate.shape / before - 1.0).abs());
@@ -129,7 +138,8 @@ impl Data<'_> {
             let mut at = fit.clone();
             if change > 0.0 {
                 // Curvature belongs to the knobs as they will be.
-                problem = self.problem(terms.iter().map(|t| Term { tangent_at: None, ..t.clone() }).collect());
+                problem =
+                    self.problem(terms.iter().map(|t| Term { tangent_at: None, ..t.clone() }).collect(), &Kind::ALL);
                 if let Some(curvature) = &curvature {
                     problem.bend(self.signals, self.band, self.standstill, curvature);
                 }

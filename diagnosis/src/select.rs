@@ -1,5 +1,6 @@
 //! Which candidates: best subset by local search on held-out deviance, then pruning by the one-standard-error rule.
 
+use crate::band::Band;
 use crate::problem::Problem;
 use gapscope_effects::{Candidate, Kind};
 use rayon::prelude::*;
@@ -45,6 +46,8 @@ const SHARED_SIZE: f64 = 0.5;
 const RIVAL_MOVES: usize = 8;
 /// Moves of the local search, at most.
 const MOVES: usize = 40;
+/// Times that the problem is weighed anew, at most.
+const WEIGHINGS: usize = 3;
 /// Kinds of effects side by side, at most: more are a sign that none of them is right.
 const KINDS_AT_MOST: usize = 6;
 
@@ -78,11 +81,27 @@ pub fn kinds(problem: &Problem, set: &[usize]) -> Vec<Kind> {
     kinds
 }
 
-/// Chooses a set of candidates, none of the kinds in `forbidden`, starting from `start`.
-pub fn choose(problem: &Problem, start: &[usize], forbidden: &[Kind]) -> Choice {
-    let best = search(problem, start, forbidden, MOVES);
-    let simple = simplify(problem, prune(problem, best), forbidden);
+/// Best set of candidates, starting from `start`; the problem is weighed on the way.
+pub fn choose(problem: &mut Problem, band: &Band, start: &[usize]) -> Choice {
+    let best = settle(problem, band, start);
+    let simple = simplify(problem, prune(problem, best));
     prune(problem, grow(problem, simple))
+}
+
+/// Weighs the problem by the best set under the weights before, until that set stays: what an effect leaves while it is
+/// not yet seen is no noise.
+fn settle(problem: &mut Problem, band: &Band, start: &[usize]) -> Choice {
+    let mut best = search(problem, start, &[], MOVES);
+    for _ in 0..WEIGHINGS {
+        problem.weigh(band, &best.set);
+        let next = search(problem, &best.set, &[], MOVES);
+        let same = next.set == best.set;
+        best = next;
+        if same {
+            break;
+        }
+    }
+    best
 }
 
 /// Local search, at most so many moves: near neighbours first, wider ones where those do not help.
@@ -129,29 +148,42 @@ const NESTED: [(Kind, Kind); 6] = [
 ];
 
 /// Takes the simpler of two nested laws, a bias for a spring, where the richer one is not better by two standard errors or
-/// its torque hardly differs.
-fn simplify(problem: &Problem, mut choice: Choice, forbidden: &[Kind]) -> Choice {
-    for c in choice.set.clone() {
+/// its torque hardly differs: all joints of a kind together, then one by one.
+fn simplify(problem: &Problem, mut choice: Choice) -> Choice {
+    let simpler = |c: usize| {
         let rich = &problem.entries[c].candidate;
-        let Some(&(_, simple)) = NESTED.iter().find(|(kind, _)| *kind == rich.kind) else { continue };
-        let simpler = (0..problem.entries.len()).find(|&other| {
-            let other = &problem.entries[other].candidate;
-            other.kind == simple && other.joints == rich.joints && !forbidden.contains(&simple)
-        });
-        let Some(simpler) = simpler else { continue };
-        let set = choice.set.iter().map(|&other| if other == c { simpler } else { other }).collect();
-        let simpler = evaluate(problem, set);
-        let (loss, error) = paired_difference(&simpler.blocks, &choice.blocks);
-        let alone = choice.set.iter().filter(|&&o| problem.entries[o].candidate.kind == rich.kind).count() == 1;
-        let (needed, part) = if alone || !SHARED.contains(&rich.kind) {
-            (STANDARD_ERRORS, 1.0)
-        } else {
+        let (_, simple) = NESTED.iter().find(|(kind, _)| *kind == rich.kind)?;
+        problem.entries.iter().position(|e| e.candidate.kind == *simple && e.candidate.joints == rich.joints)
+    };
+    let replaced = |choice: &Choice, gone: &dyn Fn(usize) -> bool| {
+        let in_stead = |c: usize| if gone(c) { simpler(c).unwrap_or(c) } else { c };
+        let set: Vec<usize> = choice.set.iter().map(|&c| in_stead(c)).collect();
+        (set != choice.set).then(|| evaluate(problem, set))
+    };
+    let as_good = |simple: &Choice, rich: &Choice, errors: f64, part: f64| {
+        let (loss, error) = paired_difference(&simple.blocks, &rich.blocks);
+        let moved = moved(problem, rich, simple);
+        loss <= errors * error || moved.iter().zip(&problem.least).all(|(moved, least)| *moved <= part * least)
+    };
+    let kind_of = |c: usize| problem.entries[c].candidate.kind;
+    for kind in kinds(problem, &choice.set) {
+        if let Some(simple) = replaced(&choice, &|c| kind_of(c) == kind) {
+            if as_good(&simple, &choice, STANDARD_ERRORS, 1.0) {
+                choice = simple;
+            }
+        }
+    }
+    for c in choice.set.clone() {
+        let several = choice.set.iter().filter(|&&other| kind_of(other) == kind_of(c)).count() > 1;
+        let (errors, part) = if several && SHARED.contains(&kind_of(c)) {
             (SHARED_STANDARD_ERRORS, SHARED_SIZE)
+        } else {
+            (STANDARD_ERRORS, 1.0)
         };
-        let same =
-            moved(problem, &choice, &simpler).iter().zip(&problem.least).all(|(moved, least)| *moved <= part * least);
-        if loss <= needed * error || same {
-            choice = simpler;
+        if let Some(simple) = replaced(&choice, &|other| other == c) {
+            if as_good(&simple, &choice, errors, part) {
+                choice = simple;
+            }
         }
     }
     choice
@@ -331,11 +363,12 @@ fn prune(problem: &Problem, mut choice: Choice) -> Choice {
                 let needed = if shared { SHARED_STANDARD_ERRORS } else { STANDARD_ERRORS };
                 let part = if shared { SHARED_SIZE } else { 1.0 };
                 let matters = moved.iter().zip(&problem.least).any(|(rms, least)| *rms > part * least);
-                // A law that wants to be bigger than it can physically be is some other law.
+                // A law that wants to be more than it can physically be is some other law; nothing at all, zero, it can be.
                 let matters = matters
                     && own.clone().all(|column| {
                         let at = columns.iter().position(|&c| c == column);
-                        at.is_none_or(|at| theta[at] < problem.bounds[column].1)
+                        let (low, high) = problem.bounds[column];
+                        at.is_none_or(|at| theta[at] < high && (theta[at] > low || low == 0.0))
                     });
                 let total = |choice: &Choice| choice.blocks.iter().sum::<f64>();
                 let score = if !matters {

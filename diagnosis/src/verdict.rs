@@ -18,6 +18,12 @@ pub fn unexplained_fraction(torque: &Change, floor: f64) -> f64 {
     if before <= 0.0 { 0.0 } else { ((after - floor * floor) / before).clamp(0.0, 1.0) }
 }
 
+/// Whether a gap that is left, of so much before, is more than noise and more than the part that explained gaps leave.
+pub fn leaves_much(after: f64, before: f64, floor: f64) -> bool {
+    let change = Change { before: Some(before), after: Some(after), shrink: None, ci95: None };
+    after > (NEAR_FLOOR * floor).max(IMMATERIAL_GAP) && unexplained_fraction(&change, floor) > EXPLAINED
+}
+
 /// The answer in a word. `torque` is the weighted held-out gap, `floor` the noise floor in the same measure.
 pub fn verdict(effects: &[Effect], torque: &Change, floor: f64, unexplained: f64) -> Verdict {
     let left = torque.after.unwrap_or(0.0);

@@ -115,7 +115,6 @@ fn columns_with_a_knob_are_what_the_effect_adds() {
         (with_shape(Kind::TorqueRipple, vec![3], 12.0), vec![0.4, -0.3]),
         (with_shape(Kind::ActuationDelay, vec![], 0.0071), vec![0.0071]),
         (with_shape(Kind::ActuatorLag, vec![], 0.012), vec![0.012]),
-        (Candidate::new(Kind::LoadDependentFriction, vec![2]), vec![0.1]),
         (Candidate::new(Kind::ExternalContact, vec![5]), vec![5.0, -3.0, 8.0]),
     ] {
         let (worst, largest) = compare(&model, &candidate, &theta);
@@ -128,12 +127,14 @@ fn columns_with_a_knob_are_what_the_effect_adds() {
 
 /// Halving what is small quarters what the first order leaves out.
 #[test]
-fn columns_of_offset_and_elasticity_are_exact_to_first_order() {
+fn columns_of_offset_elasticity_and_load_are_exact_to_first_order() {
     let model = robot("arm6");
     let motor = |kind| Candidate { side: EncoderSide::Motor, ..Candidate::new(kind, vec![1]) };
-    for (candidate, theta) in
-        [(Candidate::new(Kind::JointZeroOffset, vec![1]), vec![0.02]), (motor(Kind::JointElasticity), vec![0.0, 2e-5])]
-    {
+    for (candidate, theta) in [
+        (Candidate::new(Kind::JointZeroOffset, vec![1]), vec![0.02]),
+        (motor(Kind::JointElasticity), vec![0.0, 2e-5]),
+        (Candidate::new(Kind::LoadDependentFriction, vec![2]), vec![0.08]),
+    ] {
         let half: Vec<f64> = theta.iter().map(|t| 0.5 * t).collect();
         let ((whole, largest), (half, _)) = (compare(&model, &candidate, &theta), compare(&model, &candidate, &half));
         assert!(whole < 0.1 * largest, "{candidate:?}: {whole:e} of {largest:e}");

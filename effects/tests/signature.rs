@@ -127,7 +127,13 @@ fn coefficients(draw: &mut Draw, model: &Model, candidate: &Candidate, columns: 
 }
 
 /// Kinds whose columns are exact to first order only, or that one sample does not show.
-const INEXACT: [Kind; 4] = [Kind::GravityMisalignment, Kind::JointZeroOffset, Kind::JointElasticity, Kind::Backlash];
+const INEXACT: [Kind; 5] = [
+    Kind::LoadDependentFriction,
+    Kind::GravityMisalignment,
+    Kind::JointZeroOffset,
+    Kind::JointElasticity,
+    Kind::Backlash,
+];
 
 /// Every candidate whose columns are exact, sample by sample.
 fn columns_are_what_the_effect_adds(model: &Model, draw: &mut Draw) {
@@ -182,10 +188,7 @@ fn columns_of_several_effects_add_up() {
     let mut sum = vec![vec![0.0; SAMPLES]; 7];
     let mut effects = Vec::new();
     // Gain multiplies what the others add, and tilt meets the payload.
-    // A bias is part of the load that load-dependent friction bears.
-    let bends = |c: &&Candidate| {
-        matches!(c.kind, Kind::TorqueGainError | Kind::LoadDependentFriction) || INEXACT.contains(&c.kind)
-    };
+    let bends = |c: &&Candidate| c.kind == Kind::TorqueGainError || INEXACT.contains(&c.kind);
     for candidate in Candidate::all(&model).iter().filter(|c| !bends(c)) {
         let columns = candidate.columns(&motion);
         let theta = coefficients(&mut draw, &model, candidate, &columns);

@@ -37,15 +37,21 @@ impl Direction {
 
     /// Greatest dry friction at a speed, a time since the start of the episode and delivered efforts, N m.
     pub(super) fn bound(&self, speed: f64, time: f64, delivered: &[f64]) -> f64 {
+        let mut bound = self.unloaded_bound(speed, time);
+        if let (true, Some(&(joint, _))) = (self.load > 0.0, self.parts.first()) {
+            bound += self.load * delivered[joint].abs();
+        }
+        bound
+    }
+
+    /// The same without what the delivered effort adds.
+    pub(super) fn unloaded_bound(&self, speed: f64, time: f64) -> f64 {
         let mut bound = self.coulomb;
         if self.static_rise > 0.0 {
             bound += self.static_rise * (-(speed / self.stribeck_velocity).powi(2)).exp();
         }
         if self.cold_rise != 0.0 {
             bound += self.cold_rise * (-time / self.time_constant).exp();
-        }
-        if let (true, Some(&(joint, _))) = (self.load > 0.0, self.parts.first()) {
-            bound += self.load * delivered[joint].abs();
         }
         bound
     }

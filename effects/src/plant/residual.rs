@@ -196,7 +196,11 @@ impl Plant {
             let speed = direction.along(v);
             let band: f64 = direction.parts.iter().map(|&(j, weight)| weight.abs() * standstill[j]).sum();
             let square: f64 = direction.parts.iter().map(|&(_, weight)| weight * weight).sum();
-            let bound = direction.bound(speed, past.time, &s.delivered);
+            let bound = if speed.abs() >= band {
+                direction.unloaded_bound(speed, past.time)
+            } else {
+                direction.bound(speed, past.time, &s.delivered)
+            };
             let force = sliding(bound, speed, band, direction.along(residual) / square);
             for &(j, weight) in &direction.parts {
                 residual[j] -= weight * force;
@@ -207,6 +211,15 @@ impl Plant {
                 Some(bent) => b.coulomb * bent[i],
                 None => sliding(b.coulomb, v[b.joint], standstill[b.joint], residual[b.joint]),
             };
+        }
+        // Friction that grows with the load takes its part of the effort that overcomes all else: from the effort predicted,
+        // not from the one measured, which with μ = 1 would explain itself.
+        for direction in self.directions.iter().filter(|d| d.load > 0.0) {
+            let (&[(j, _)], speed) = (direction.parts.as_slice(), direction.along(v)) else { continue };
+            if speed.abs() >= standstill[j] {
+                let needed = s.delivered[j] - residual[j];
+                residual[j] = s.delivered[j] - needed / (1.0 - direction.load * speed.signum() * needed.signum());
+            }
         }
     }
 }

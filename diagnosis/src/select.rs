@@ -167,11 +167,8 @@ fn simplify(problem: &Problem, mut choice: Choice) -> Choice {
     };
     let kind_of = |c: usize| problem.entries[c].candidate.kind;
     for kind in kinds(problem, &choice.set) {
-        if let Some(simple) = replaced(&choice, &|c| kind_of(c) == kind) {
-            if as_good(&simple, &choice, STANDARD_ERRORS, 1.0) {
-                choice = simple;
-            }
-        }
+        let simple = replaced(&choice, &|c| kind_of(c) == kind);
+        choice = simple.filter(|simple| as_good(simple, &choice, STANDARD_ERRORS, 1.0)).unwrap_or(choice);
     }
     for c in choice.set.clone() {
         let several = choice.set.iter().filter(|&&other| kind_of(other) == kind_of(c)).count() > 1;
@@ -180,11 +177,8 @@ fn simplify(problem: &Problem, mut choice: Choice) -> Choice {
         } else {
             (STANDARD_ERRORS, 1.0)
         };
-        if let Some(simple) = replaced(&choice, &|other| other == c) {
-            if as_good(&simple, &choice, errors, part) {
-                choice = simple;
-            }
-        }
+        let simple = replaced(&choice, &|other| other == c);
+        choice = simple.filter(|simple| as_good(simple, &choice, errors, part)).unwrap_or(choice);
     }
     choice
 }

@@ -3,7 +3,7 @@
 
 use crate::band::Band;
 use crate::signals::Signals;
-use gapscope_dynamics::Model;
+use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{Candidate, Column, Effect, EncoderSide, Kind, Motion};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -22,6 +22,8 @@ const MATERIAL: f64 = 3.0;
 /// ... by this part of the noise, which many rows average out, and by all of what no candidate explains beyond the noise,
 /// which no number of rows averages out: with unknown effects of that size about, a smaller one cannot be named.
 const OF_NOISE: f64 = 0.2;
+/// Resonance of a link on its locked drive, Hz, below which no drive is built.
+const SOFTEST: f64 = 1.5;
 /// Eigenvalues of a candidate's normal equations below this part of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-6;
 /// Part of a column's size below which what a set leaves of it is rounding.
@@ -156,7 +158,9 @@ pub struct Problem {
     /// Typical effort of each joint, N m or N.
     pub scale: Vec<f64>,
     /// Noise floor of each joint, N m or N.
-    noise: Vec<f64>,
+    pub noise: Vec<f64>,
+    /// Inertia of the nominal robot about each joint, in the middle of the first episode, kg m² or kg.
+    inertia: Vec<f64>,
     /// Standard deviation of what the weighing set does not explain, N m or N, with the immaterial part as its least value.
     pub sigma: Vec<f64>,
     /// Least root mean square torque by which an effect must move a joint to be named on its account, N m or N.
@@ -267,6 +271,7 @@ impl Problem {
             bounds,
             scale,
             noise: noise.to_vec(),
+            inertia: inertia_about_joints(model, signals),
             sigma: vec![1.0; n],
             least: vec![0.0; n],
             correlation: vec![1.0; n],
@@ -317,6 +322,25 @@ impl Problem {
             }
         });
         self.accumulate(band);
+    }
+
+    /// Whether a robot could have an entry with these coefficients. A law that wants to be more than its bounds is some
+    /// other law (nothing at all, zero, it can be), and so is a drive in which the link would sway.
+    pub fn plausible(&self, c: usize, theta: &[f64]) -> bool {
+        let entry = &self.entries[c];
+        let inside = theta
+            .iter()
+            .zip(&self.bounds[entry.columns.clone()])
+            .all(|(&theta, &(low, high))| theta < high && (theta > low || low == 0.0));
+        let candidate = &entry.candidate;
+        let stiff = match (candidate.kind, theta, candidate.joints.as_slice()) {
+            (Kind::JointElasticity, &[rotor, second], &[j]) => {
+                let stiffness = if candidate.side == EncoderSide::Link { rotor / second } else { 1.0 / second };
+                stiffness >= self.inertia[j] * (std::f64::consts::TAU * SOFTEST).powi(2)
+            }
+            _ => true,
+        };
+        inside && stiff
     }
 
     /// Number of blocks that hold rows.
@@ -673,6 +697,16 @@ impl JointRows {
     fn residual(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {
         self.predict(columns, theta).iter().zip(&self.target).map(|(p, y)| y - p).collect()
     }
+}
+
+fn inertia_about_joints(model: &Model, signals: &[Signals]) -> Vec<f64> {
+    let n = model.dof();
+    let mut mass = DMatrix::zeros(n, n);
+    let q = |s: &Signals| -> Vec<f64> { s.q.iter().map(|q| q.get(s.len() / 2).copied().unwrap_or(0.0)).collect() };
+    if let Some(s) = signals.first() {
+        model.mass_matrix(&mut Data::new(model), &q(s), &mut mass);
+    }
+    mass.diagonal().iter().copied().collect()
 }
 
 /// Directions of a candidate's coefficients along which the torque moves, from its part of the normal equations.

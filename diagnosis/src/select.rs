@@ -36,6 +36,11 @@ const SHORTLIST: usize = 12;
 const RARE_COST: f64 = 2.0;
 /// A candidate stays where leaving it out costs more than this many standard errors of the paired difference over blocks.
 const STANDARD_ERRORS: f64 = 2.0;
+/// Kinds whose signature is cut from the measured effort or differentiates the position four times: it holds their noise,
+/// and so explains some of it, held-out rows included.
+const HOLD_NOISE: [Kind; 3] = [Kind::TorqueSaturation, Kind::JointElasticity, Kind::Backlash];
+/// What such a signature must move, over the noise.
+const OVER_NOISE: f64 = 1.5;
 /// A candidate stays where the deviance without it is this many times that with it.
 const DECISIVE: f64 = 1.5;
 /// The same for a further joint of a kind that joints usually share.
@@ -356,14 +361,12 @@ fn prune(problem: &Problem, mut choice: Choice) -> Choice {
                 let shared = SHARED.contains(&kind) && others > 1;
                 let needed = if shared { SHARED_STANDARD_ERRORS } else { STANDARD_ERRORS };
                 let part = if shared { SHARED_SIZE } else { 1.0 };
-                let matters = moved.iter().zip(&problem.least).any(|(rms, least)| *rms > part * least);
-                // A law that wants to be more than it can physically be is some other law; nothing at all, zero, it can be.
-                let matters = matters
-                    && own.clone().all(|column| {
-                        let at = columns.iter().position(|&c| c == column);
-                        let (low, high) = problem.bounds[column];
-                        at.is_none_or(|at| theta[at] < high && (theta[at] > low || low == 0.0))
-                    });
+                let least = |j: usize| {
+                    let least = part * problem.least[j];
+                    if HOLD_NOISE.contains(&kind) { least.max(OVER_NOISE * problem.noise[j]) } else { least }
+                };
+                let matters = moved.iter().enumerate().any(|(j, rms)| *rms > least(j));
+                let matters = matters && problem.plausible(c, &own_theta);
                 let total = |choice: &Choice| choice.blocks.iter().sum::<f64>();
                 let score = if !matters {
                     f64::NEG_INFINITY

@@ -1,6 +1,7 @@
 //! The diagnosis: logs and a robot in; where, which and how far out.
 
 use crate::band::Band;
+use crate::constancy;
 use crate::contact;
 use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
 use crate::estimate::Fit;
@@ -19,6 +20,7 @@ use crate::verdict;
 use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, Effect, EffectError, EncoderSide, Kind, Plant, Range};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -48,6 +50,8 @@ const EDGE: f64 = 0.15;
 const MISFIT: i32 = 4;
 /// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
 const MANY: usize = 3;
+/// Poses of an episode that an inertia is the mean of.
+const POSES: usize = 50;
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
 
@@ -149,10 +153,11 @@ struct Chosen {
 }
 
 /// What each joint does in the logs.
-fn ranges(signals: &[Signals], joints: usize) -> Vec<Range> {
+fn ranges(model: &Model, signals: &[Signals]) -> Vec<Range> {
+    let inertia = inertia(model, signals);
     let quantile =
         |sorted: &[f64], part: f64| sorted.get((part * sorted.len() as f64) as usize).copied().unwrap_or(0.0);
-    (0..joints)
+    (0..model.dof())
         .map(|j| {
             let sorted = |pick: &dyn Fn(&Signals) -> Vec<f64>| {
                 let mut all: Vec<f64> = signals.iter().flat_map(pick).collect();
@@ -167,9 +172,26 @@ fn ranges(signals: &[Signals], joints: usize) -> Vec<Range> {
                 span: place.last().zip(place.first()).map_or(0.0, |(last, first)| last - first),
                 torque: quantile(&torque, 0.995),
                 duration: signals.iter().map(|s| s.len() as f64 * s.dt).fold(0.0, f64::max),
+                inertia: inertia[j],
             }
         })
         .collect()
+}
+
+/// Inertia of the nominal robot about each joint, the mean of some poses of the logs, kg m² or kg.
+fn inertia(model: &Model, signals: &[Signals]) -> Vec<f64> {
+    let n = model.dof();
+    let mut sum = DMatrix::zeros(n, n);
+    let (mut data, mut mass, mut q) = (gapscope_dynamics::Data::new(model), DMatrix::zeros(n, n), vec![0.0; n]);
+    for s in signals {
+        for k in (0..s.len()).step_by((s.len() / POSES).max(1)) {
+            Signals::gather(&s.q, k, &mut q);
+            model.mass_matrix(&mut data, &q, &mut mass);
+            sum += &mass;
+        }
+    }
+    let trials = signals.iter().map(|s| (0..s.len()).step_by((s.len() / POSES).max(1)).len()).sum::<usize>();
+    sum.diagonal().iter().map(|m| m / trials.max(1) as f64).collect()
 }
 
 fn median(mut x: Vec<f64>) -> f64 {
@@ -243,7 +265,7 @@ impl Logs<'_> {
     /// alone have their turn, and stay if they predict as well with no more of them. A set that makes the gap larger is no explanation: then the next choice
     /// does without the kinds that promise most.
     fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        let weights = gap::weights(&self.signals, &self.moving);
+        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
         let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, |_| true)), &weights);
         let left = |chosen: &Chosen| -> Result<f64, EffectError> {
             Ok(rms(&self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows))
@@ -254,9 +276,10 @@ impl Logs<'_> {
         let flexible: Vec<Kind> = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k)).collect();
         let bends = |chosen: &Chosen| chosen.exact.entries.iter().any(|e| flexible.contains(&e.candidate.kind));
         let floor = gap::weighted_rms(&best.1.noise.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &weights);
+        let judged = |after: f64| verdict::Judged { before, after, floor };
         let count = |chosen: &Chosen| select::kinds(&chosen.exact, &chosen.fit.set).len();
         let many = count(&best.1) >= MANY;
-        if bends(&best.1) && (many || verdict::leaves_much(best.0, before, floor)) {
+        if bends(&best.1) && (many || judged(best.0).leaves_much()) {
             let linear = self.choose_among(&flexible, progress)?;
             let after = left(&linear)?;
             if after <= best.0 && count(&linear) <= count(&best.1) {
@@ -264,6 +287,9 @@ impl Logs<'_> {
             }
         }
         if best.1.fit.set.is_empty() || best.0 < before {
+            if judged(best.0).leaves_most() {
+                return self.constant(best.1);
+            }
             return Ok(best.1);
         }
         let chosen = self.choose_among(&INERTIAL, progress)?;
@@ -275,6 +301,19 @@ impl Logs<'_> {
         Ok(Chosen { choice, exact, fit, ..chosen })
     }
 
+    /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first.
+    fn constant(&self, mut chosen: Chosen) -> Result<Chosen, EffectError> {
+        while let Some(&(worst, _)) =
+            constancy::inconsistent(&chosen.exact, &chosen.fit, &self.signals, &self.band).first()
+        {
+            chosen.choice.set.remove(worst);
+            let (exact, fit) = self.data(&chosen.noise).refine(&self.candidates(&chosen.all, &chosen.choice.set))?;
+            let choice = select::evaluate(&chosen.all, chosen.choice.set);
+            chosen = Chosen { exact, fit, choice, ..chosen };
+        }
+        Ok(chosen)
+    }
+
     fn choose_among(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let residuals: Vec<Vec<Vec<f64>>> = self
             .signals
@@ -284,7 +323,7 @@ impl Logs<'_> {
         let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof());
         let data = self.data(&noise);
         let mut candidates = Candidate::all(self.model);
-        let mut ranges = ranges(&self.signals, self.model.dof());
+        let mut ranges = ranges(self.model, &self.signals);
         for (j, range) in ranges.iter_mut().enumerate() {
             // A cut of an effort that is mostly noise would explain that noise by itself.
             let noise = self.signals.iter().map(|s| s.effort_noise[j]).fold(0.0, f64::max);
@@ -449,12 +488,15 @@ impl Logs<'_> {
             let time = s.first as f64 * s.raw.dt + row.center as f64 * s.dt;
             s.pushed.iter().all(|[from, to]| time < from - EDGE || time > to + EDGE)
         };
-        let apart = |rows: &Rows| gap::squares(&self.band, rows, calm);
-        let away = gap::change(&apart(&before.rows), &apart(&after.rows), &weights, floor_rms);
         let pushes = effects.iter().any(|e| e.kind() == Kind::ExternalContact);
-        let judged = if pushes { &away } else { &torque };
-        let unexplained = verdict::unexplained_fraction(judged, floor_rms);
-        let verdict = verdict::verdict(&effects, judged, floor_rms, unexplained);
+        let counts = |i: usize| !pushes || calm(i);
+        let concern = gap::weights_of_concern(model, &self.signals, &self.moving);
+        let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, counts)), &concern);
+        let floor_of_concern =
+            gap::weighted_rms(&floor.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &concern);
+        let judged = verdict::Judged { before: rms(&before.rows), after: rms(&after.rows), floor: floor_of_concern };
+        let unexplained = judged.unexplained_fraction();
+        let verdict = judged.verdict(effects.is_empty());
         let misfit = if verdict == Verdict::Explained { 0.0 } else { unexplained };
         let found = self.found_effects(chosen, rivals, &torque, misfit, &weights)?;
         let corrected = Corrected {

@@ -7,6 +7,9 @@ use crate::signals::Signals;
 use gapscope_dynamics::Model;
 use std::collections::BTreeMap;
 
+/// Part of a joint's effort limit that is nobody's concern.
+const UNNOTICED: f64 = 1e-3;
+
 /// Residual torque at the rows of the band: `[joint][row]`, N m or N.
 pub type Rows = Vec<Vec<f64>>;
 
@@ -33,6 +36,17 @@ pub fn weights(signals: &[Signals], moving: &[bool]) -> Vec<f64> {
             let deviation = (all().map(|t| (t - mean).powi(2)).sum::<f64>() / count).sqrt();
             if moves && deviation > 0.0 { 1.0 / deviation } else { 0.0 }
         })
+        .collect()
+}
+
+/// The same weights but for joints whose effort hardly leaves zero: there a thousandth of the effort limit is the scale, so
+/// that a verdict does not hang on what no drive would notice.
+pub fn weights_of_concern(model: &Model, signals: &[Signals], moving: &[bool]) -> Vec<f64> {
+    let limits = model.joints().iter().map(|j| j.limits.effort.unwrap_or(0.0));
+    weights(signals, moving)
+        .into_iter()
+        .zip(limits)
+        .map(|(w, limit)| if w > 0.0 { 1.0 / (1.0 / w).hypot(UNNOTICED * limit) } else { 0.0 })
         .collect()
 }
 

@@ -8,6 +8,7 @@
 
 mod band;
 mod bootstrap;
+mod constancy;
 mod contact;
 mod corrected;
 mod diagnose;

@@ -3,7 +3,7 @@
 
 use crate::band::Band;
 use crate::signals::Signals;
-use gapscope_dynamics::{Data, Model};
+use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, Column, Effect, EncoderSide, Kind, Motion};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -159,8 +159,6 @@ pub struct Problem {
     pub scale: Vec<f64>,
     /// Noise floor of each joint, N m or N.
     pub noise: Vec<f64>,
-    /// Inertia of the nominal robot about each joint, in the middle of the first episode, kg m² or kg.
-    inertia: Vec<f64>,
     /// Standard deviation of what the weighing set does not explain, N m or N, with the immaterial part as its least value.
     pub sigma: Vec<f64>,
     /// Least root mean square torque by which an effect must move a joint to be named on its account, N m or N.
@@ -271,7 +269,6 @@ impl Problem {
             bounds,
             scale,
             noise: noise.to_vec(),
-            inertia: inertia_about_joints(model, signals),
             sigma: vec![1.0; n],
             least: vec![0.0; n],
             correlation: vec![1.0; n],
@@ -324,6 +321,20 @@ impl Problem {
         self.accumulate(band);
     }
 
+    /// The same problem on some of the band's rows, with the same weights.
+    pub fn masked(&self, band: &Band, keep: impl Fn(usize) -> bool) -> Problem {
+        let mut part = self.clone();
+        for joint in &mut part.joints {
+            for (weight, &row) in joint.robust.iter_mut().zip(&joint.rows) {
+                if !keep(row) {
+                    *weight = 0.0;
+                }
+            }
+        }
+        part.accumulate(band);
+        part
+    }
+
     /// Whether a robot could have an entry with these coefficients. A law that wants to be more than its bounds is some
     /// other law (nothing at all, zero, it can be), and so is a drive in which the link would sway.
     pub fn plausible(&self, c: usize, theta: &[f64]) -> bool {
@@ -333,13 +344,8 @@ impl Problem {
             .zip(&self.bounds[entry.columns.clone()])
             .all(|(&theta, &(low, high))| theta < high && (theta > low || low == 0.0));
         let candidate = &entry.candidate;
-        let stiff = match (candidate.kind, theta, candidate.joints.as_slice()) {
-            (Kind::JointElasticity, &[rotor, second], &[j]) => {
-                let stiffness = if candidate.side == EncoderSide::Link { rotor / second } else { 1.0 / second };
-                stiffness >= self.inertia[j] * (std::f64::consts::TAU * SOFTEST).powi(2)
-            }
-            _ => true,
-        };
+        let softest = candidate.inertia * (std::f64::consts::TAU * SOFTEST).powi(2);
+        let stiff = candidate.kind != Kind::JointElasticity || candidate.stiffness(theta).is_some_and(|k| k > softest);
         inside && stiff
     }
 
@@ -697,16 +703,6 @@ impl JointRows {
     fn residual(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {
         self.predict(columns, theta).iter().zip(&self.target).map(|(p, y)| y - p).collect()
     }
-}
-
-fn inertia_about_joints(model: &Model, signals: &[Signals]) -> Vec<f64> {
-    let n = model.dof();
-    let mut mass = DMatrix::zeros(n, n);
-    let q = |s: &Signals| -> Vec<f64> { s.q.iter().map(|q| q.get(s.len() / 2).copied().unwrap_or(0.0)).collect() };
-    if let Some(s) = signals.first() {
-        model.mass_matrix(&mut Data::new(model), &q(s), &mut mass);
-    }
-    mass.diagonal().iter().copied().collect()
 }
 
 /// Directions of a candidate's coefficients along which the torque moves, from its part of the normal equations.

@@ -114,10 +114,9 @@ impl Data<'_> {
                 let (_, theta) = fit.own(&problem, i);
                 let entry = &problem.entries[i];
                 let before = term.candidate.shape;
-                if matches!(term.candidate.kind, Kind::ActuationDelay | Kind::ActuatorLag) {
-                    // The signature is a secant: its coefficient is where the next one ends.
-                    term.candidate.shape = theta[0].clamp(1e-5, 0.5);
-                    change = change.max((term.candidate.shape / before - 1.0).abs());
+                if let Some(next) = term.candidate.secant(&theta) {
+                    term.candidate.shape = next;
+                    change = change.max((next / before - 1.0).abs());
                 } else if term.candidate.has_knob() {
                     if let (true, Some((by, rest))) = (entry.tangent, theta.split_last()) {
                         let (low, high) = if term.candidate.kind == Kind::TorqueSaturation { LIMIT } else { KNOB };

@@ -8,10 +8,12 @@
 //! which the link alone, at the middle of its range, would vibrate at 20 Hz on the locked motor.
 
 use crate::effect::{Law, Value, check, per_joint};
-use crate::filter::side_of_play;
-use crate::joint_elasticity::columns;
+use crate::joint_elasticity::{ahead, behind, mean};
+use crate::plant::CONTACT;
 use crate::signature::{Column, EncoderSide};
+use crate::wind_up::{Coupling, WindUp, inertia_about};
 use crate::{EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Data;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -46,9 +48,24 @@ impl Law for Backlash {
     }
 }
 
-/// Two columns: the rotor's, and what the play adds by the encoder's side. Coefficients: J and J · gap where the link's
-/// position is logged, J and gap where the motor's is.
-pub(crate) fn signature(motion: &Motion, joint: usize, side: EncoderSide) -> Vec<Column> {
-    let half: Vec<f64> = side_of_play(&motion.nominal[joint]).iter().map(|s| 0.5 * s).collect();
-    columns(motion, joint, &half, side)
+/// Two columns at a gap, rad (m): the rotor's, and what the play adds by the encoder's side. Coefficients: J, and J or one
+/// times by how much wider the gap is.
+///
+/// On the link's side a rotor as heavy as the link is driven through the play by the logged effort; on the motor's side
+/// the nominal link falls behind.
+pub(crate) fn signature(motion: &Motion, joint: usize, gap: f64, side: EncoderSide) -> Vec<Column> {
+    let inertia = inertia_about(motion.model, &mut Data::new(motion.model), motion, joint);
+    let (frequency, ratio) = CONTACT;
+    let contact = Coupling { half_gap: 0.5 * gap, ..Coupling::resonant(mean(&inertia), frequency, ratio) };
+    match side {
+        EncoderSide::Link => {
+            let own = inertia.iter().zip(&motion.a[joint]).zip(&motion.tau[joint]);
+            let forced: Vec<f64> = own.map(|((inertia, a), tau)| tau - inertia * a).collect();
+            let wind_up = WindUp::forced(&forced, &inertia, &contact, motion.dt);
+            ahead(motion, joint, wind_up.acceleration)
+        }
+        EncoderSide::Motor => {
+            behind(motion, joint, &WindUp::forced(&motion.nominal[joint], &inertia, &contact, motion.dt))
+        }
+    }
 }

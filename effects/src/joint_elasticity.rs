@@ -7,10 +7,12 @@
 //! the link gets the effort, θ = q + τ/k, and the damping has nothing to act on. Friction, springs and ripple act on the link.
 
 use crate::effect::{Law, Value, check, per_joint};
-use crate::filter::{first_derivative, second_derivative, smooth};
+use crate::filter::first_order;
 use crate::joint_zero_offset::moved;
 use crate::signature::{Column, EncoderSide};
+use crate::wind_up::{Coupling, WindUp, inertia_about};
 use crate::{EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Data;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -54,32 +56,44 @@ impl Law for JointElasticity {
     }
 }
 
-/// Half-width of the window that the torque is smoothed with before it is differentiated, s; about 10 Hz.
-const HALF_WIDTH: f64 = 0.036;
+/// Damping ratio of the link on its locked motor that is taken for granted where a log is explained: a log hardly tells it.
+pub(crate) const RATIO: f64 = 0.05;
 
-/// Two columns: the rotor's, and what the wind-up under the nominal torque adds, by the encoder's side.
+/// Two columns at a resonance of the link on its locked motor, Hz: the rotor's, and what the wind-up adds, by the encoder's
+/// side.
 ///
-/// On the link's side the rotor turns ahead of the link by τ/k: coefficients J and J/k. On the motor's side the link lies
-/// behind the log by τ/k: coefficients J and 1/k. Exact to first order in 1/k.
-pub(crate) fn signature(motion: &Motion, joint: usize, side: EncoderSide) -> Vec<Column> {
-    columns(motion, joint, &motion.nominal[joint], side)
+/// On the link's side the rotor turns ahead by the torque that the nominal link takes over the stiffness: coefficients J and
+/// J/k. On the motor's side the nominal link swings behind: coefficients J and one, or by how much softer the joint is.
+pub(crate) fn signature(motion: &Motion, joint: usize, resonance: f64, side: EncoderSide) -> Vec<Column> {
+    match side {
+        EncoderSide::Link => {
+            let lag = 2.0 * RATIO / (std::f64::consts::TAU * resonance);
+            let torque = first_order(&motion.nominal[joint], lag, motion.dt);
+            ahead(motion, joint, WindUp::of(torque, motion.dt).acceleration)
+        }
+        EncoderSide::Motor => {
+            let inertia = inertia_about(motion.model, &mut Data::new(motion.model), motion, joint);
+            let coupling = Coupling::resonant(mean(&inertia), resonance, RATIO);
+            behind(motion, joint, &WindUp::forced(&motion.nominal[joint], &inertia, &coupling, motion.dt))
+        }
+    }
 }
 
-/// The columns for a wind-up per unit of the second coefficient.
-pub(crate) fn columns(motion: &Motion, joint: usize, wind_up: &[f64], side: EncoderSide) -> Vec<Column> {
-    let angle = smooth(wind_up, HALF_WIDTH, motion.dt);
-    let acceleration = second_derivative(&angle, motion.dt);
-    let rotor = Column::on(joint, motion.a[joint].clone(), 0.0);
-    let second = match side {
-        EncoderSide::Link => Column::on(joint, acceleration, 0.0),
-        EncoderSide::Motor => {
-            // A small step keeps the difference a derivative.
-            let largest = angle.iter().fold(1e-12, |most: f64, x| most.max(x.abs()));
-            let step = 1e-4 / largest;
-            let behind = [angle.clone(), first_derivative(&angle, motion.dt), acceleration]
-                .map(|x| x.iter().map(|x| step * x).collect::<Vec<f64>>());
-            moved(motion, joint, [&behind[0], &behind[1], &behind[2]], 1.0 / step, 0.0)
-        }
-    };
-    vec![rotor, second]
+pub(crate) fn mean(x: &[f64]) -> f64 {
+    x.iter().sum::<f64>() / x.len().max(1) as f64
 }
+
+/// The rotor's column, and that of a rotor which is ahead of its link.
+pub(crate) fn ahead(motion: &Motion, joint: usize, acceleration: Vec<f64>) -> Vec<Column> {
+    vec![Column::on(joint, motion.a[joint].clone(), 0.0), Column::on(joint, acceleration, 0.0)]
+}
+
+/// The rotor's column, and that of a link which is behind its motor.
+pub(crate) fn behind(motion: &Motion, joint: usize, wind_up: &WindUp) -> Vec<Column> {
+    let signals = [&wind_up.angle[..], &wind_up.rate, &wind_up.acceleration];
+    let swung = Column { at_most: SOFTER, ..moved(motion, joint, signals, 1.0, 0.0) };
+    vec![Column::on(joint, motion.a[joint].clone(), 0.0), swung]
+}
+
+/// How much softer a joint may at most be than where its signature was taken: beyond, another signature is nearer.
+const SOFTER: f64 = 4.0;

@@ -61,7 +61,7 @@ pub(crate) fn moved(motion: &Motion, joint: usize, behind: [&[f64]; 3], factor: 
     let [mut q, mut v, mut a] = std::array::from_fn(|_| vec![0.0; n]);
     let mut rows: Vec<(usize, Vec<f64>)> = (0..n).map(|j| (j, Vec::with_capacity(motion.len()))).collect();
     for k in 0..motion.len() {
-        for (side, torque) in [-0.5, 0.5].into_iter().zip(&mut torque) {
+        for (side, torque) in [-1.0, 0.0].into_iter().zip(&mut torque) {
             for j in 0..n {
                 (q[j], v[j], a[j]) = (motion.q[j][k], motion.v[j][k], motion.a[j][k]);
             }

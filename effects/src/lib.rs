@@ -31,6 +31,7 @@ mod torque_gain_error;
 mod torque_ripple;
 mod torque_saturation;
 mod viscous_friction;
+mod wind_up;
 
 pub use actuation_delay::ActuationDelay;
 pub use actuator_lag::ActuatorLag;

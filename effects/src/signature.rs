@@ -15,6 +15,7 @@ use crate::{
 use gapscope_dynamics::{JointKind, Model};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 /// Side of the transmission at which position is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -53,8 +54,10 @@ pub struct Candidate {
     pub joints: Vec<usize>,
     /// The knob, 0 for kinds that have none: weight of the second joint of a coupling, Stribeck velocity (rad/s),
     /// σ/f of bristles (1/rad), time constant of a drift or a lag (s), cycles of a ripple, limit of a saturation (N m),
-    /// delay (s).
+    /// delay (s), resonance of a link on its locked motor (Hz), gap of a play (rad).
     pub shape: f64,
+    /// Inertia of the link about the joint in the logs, kg m² (kg), for elasticity.
+    pub inertia: f64,
     /// Side of the transmission that the log shows, for elasticity and play.
     pub side: EncoderSide,
 }
@@ -70,6 +73,8 @@ pub struct Range {
     pub torque: f64,
     /// Length of the longest episode, s.
     pub duration: f64,
+    /// Inertia of the nominal robot about the joint, in the middle of the logs, kg m² (kg).
+    pub inertia: f64,
 }
 
 /// Stribeck velocities over the joint's top speed.
@@ -80,6 +85,10 @@ const BRISTLE: [f64; 5] = [0.0015, 0.005, 0.015, 0.05, 0.15];
 const DRIFT: [f64; 5] = [0.06, 0.15, 0.35, 0.8, 2.0];
 /// Limits over the torque that the motion takes at most: a limit that is reached is delivered, and no more than it.
 const LIMIT: [f64; 9] = [0.75, 0.85, 0.92, 0.97, 1.0, 1.04, 1.1, 1.2, 1.4];
+/// Resonances of a link on its locked motor, Hz.
+const RESONANCE: [f64; 4] = [2.5, 4.5, 8.0, 14.0];
+/// Gaps of a play, rad or m.
+const GAP: [f64; 2] = [0.01, 0.03];
 /// Delays and lags, s.
 const LATE: [f64; 4] = [0.002, 0.006, 0.012, 0.025];
 /// Cycles of a ripple: at least one and a half over the span; above that by this part of what the span resolves.
@@ -88,7 +97,7 @@ const RIPPLE: (f64, f64, usize) = (1.5, 0.35, 60);
 impl Candidate {
     /// A candidate without a knob, on the link's side.
     pub fn new(kind: Kind, joints: Vec<usize>) -> Candidate {
-        Candidate { kind, joints, shape: 0.0, side: EncoderSide::Link }
+        Candidate { kind, joints, shape: 0.0, inertia: 0.0, side: EncoderSide::Link }
     }
 
     /// Every candidate without a knob to turn that a robot offers: each kind at each joint, payloads at each leaf, couplings
@@ -123,11 +132,6 @@ impl Candidate {
                 all.extend([1.0, -1.0].map(coupling));
             }
         }
-        for kind in [Kind::JointElasticity, Kind::Backlash] {
-            for side in [EncoderSide::Link, EncoderSide::Motor] {
-                all.extend((0..model.dof()).map(|j| Candidate { side, ..Candidate::new(kind, vec![j]) }));
-            }
-        }
         all
     }
 
@@ -143,6 +147,16 @@ impl Candidate {
             per_joint(Kind::ThermalDrift, j, DRIFT.map(|part| part * range.duration).to_vec());
             per_joint(Kind::TorqueSaturation, j, LIMIT.map(|part| part * range.torque).to_vec());
         }
+        for (j, range) in ranges.iter().enumerate().filter(|(_, range)| range.inertia > 0.0) {
+            for side in [EncoderSide::Link, EncoderSide::Motor] {
+                let drive = |kind| {
+                    let joint = Candidate { side, inertia: range.inertia, ..Candidate::new(kind, vec![j]) };
+                    move |shape| Candidate { shape, ..joint.clone() }
+                };
+                all.extend(RESONANCE.map(drive(Kind::JointElasticity)));
+                all.extend(GAP.map(drive(Kind::Backlash)));
+            }
+        }
         for kind in [Kind::ActuationDelay, Kind::ActuatorLag] {
             all.extend(LATE.map(|shape| Candidate { shape, ..Candidate::new(kind, vec![]) }));
         }
@@ -152,7 +166,7 @@ impl Candidate {
 
     /// Ripples of one joint on a grid of cycles, fine enough that none falls between.
     pub fn ripples(joint: usize, range: &Range) -> Vec<Candidate> {
-        let turn = std::f64::consts::TAU / range.span;
+        let turn = TAU / range.span;
         let (least, step, count) = RIPPLE;
         (0..count)
             .map(|i| (least + step * i as f64) * turn)
@@ -171,6 +185,43 @@ impl Candidate {
                 | Kind::TorqueSaturation
                 | Kind::TorqueRipple
         )
+    }
+
+    /// The knob at which coefficients would put a signature that is a secant: a fit with the knob there comes nearer.
+    /// `None` for kinds whose knob is no part of their coefficients.
+    pub fn secant(&self, coefficients: &[f64]) -> Option<f64> {
+        let next = match (self.kind, coefficients) {
+            (Kind::ActuationDelay | Kind::ActuatorLag, &[late]) => late.clamp(1e-5, 0.5),
+            (Kind::JointElasticity, &[..]) => {
+                let stiffness = self.stiffness(coefficients)?;
+                ((stiffness / self.inertia).sqrt() / TAU).clamp(0.5, 100.0)
+            }
+            (Kind::Backlash, &[_, _]) => self.gap(coefficients)?.clamp(1e-4, 0.5),
+            _ => return None,
+        };
+        next.is_finite().then_some(next)
+    }
+
+    /// Stiffness of an elastic drive with these coefficients, N m/rad (N/m).
+    pub fn stiffness(&self, coefficients: &[f64]) -> Option<f64> {
+        let stiffness = match (self.kind, self.side, coefficients) {
+            (Kind::JointElasticity, EncoderSide::Link, &[inertia, c]) => inertia / c,
+            (Kind::JointElasticity, EncoderSide::Motor, &[_, softer]) => {
+                self.inertia * (TAU * self.shape).powi(2) / softer
+            }
+            _ => return None,
+        };
+        (stiffness.is_finite() && stiffness > 0.0).then_some(stiffness)
+    }
+
+    /// Gap of a play with these coefficients, rad (m).
+    fn gap(&self, coefficients: &[f64]) -> Option<f64> {
+        let gap = match (self.kind, self.side, coefficients) {
+            (Kind::Backlash, EncoderSide::Link, &[inertia, c]) => self.shape * c / inertia,
+            (Kind::Backlash, EncoderSide::Motor, &[_, wider]) => self.shape * wider,
+            _ => return None,
+        };
+        (gap.is_finite() && gap > 0.0).then_some(gap)
     }
 
     /// A push on each leaf, for motions that know when something pushed.
@@ -195,8 +246,8 @@ impl Candidate {
             (Kind::TorqueRipple, &[j]) => torque_ripple::signature(motion, j, self.shape),
             (Kind::ParallelSpring, &[j]) => parallel_spring::signature(motion, j),
             (Kind::JointZeroOffset, &[j]) => joint_zero_offset::signature(motion, j),
-            (Kind::JointElasticity, &[j]) => joint_elasticity::signature(motion, j, self.side),
-            (Kind::Backlash, &[j]) => backlash::signature(motion, j, self.side),
+            (Kind::JointElasticity, &[j]) => joint_elasticity::signature(motion, j, self.shape, self.side),
+            (Kind::Backlash, &[j]) => backlash::signature(motion, j, self.shape, self.side),
             (Kind::Payload | Kind::LinkInertiaError, &[j]) => payload::signature(motion, j),
             (Kind::JointCoupling, &[a, b]) => joint_coupling::signature(motion, [a, b], self.shape),
             (Kind::GravityMisalignment, _) => gravity_misalignment::signature(motion),
@@ -246,19 +297,14 @@ impl Candidate {
                 Effect::ParallelSpring(ParallelSpring { stiffness: single(k), rest_position: single(kq / k) })
             }
             (Kind::JointZeroOffset, &[offset]) => Effect::JointZeroOffset(JointZeroOffset { offset: single(offset) }),
-            (Kind::JointElasticity, &[inertia, c]) if c > 0.0 && inertia >= 0.0 => {
-                let stiffness = if self.side == EncoderSide::Link { inertia / c } else { 1.0 / c };
-                if !(stiffness.is_finite() && stiffness > 0.0) {
-                    return Vec::new();
-                }
-                let spring = JointElasticity { stiffness: single(stiffness), damping: BTreeMap::new() };
+            (Kind::JointElasticity, &[inertia, _]) if inertia >= 0.0 => {
+                let Some(stiffness) = self.stiffness(coefficients) else { return Vec::new() };
+                let damping = 2.0 * joint_elasticity::RATIO * (stiffness * self.inertia).sqrt();
+                let spring = JointElasticity { stiffness: single(stiffness), damping: single(damping) };
                 return vec![Effect::JointElasticity(spring), rotor(inertia)];
             }
-            (Kind::Backlash, &[inertia, c]) if c > 0.0 && inertia >= 0.0 => {
-                let gap = if self.side == EncoderSide::Link { c / inertia } else { c };
-                if !gap.is_finite() {
-                    return Vec::new();
-                }
+            (Kind::Backlash, &[inertia, _]) if inertia >= 0.0 => {
+                let Some(gap) = self.gap(coefficients) else { return Vec::new() };
                 return vec![Effect::Backlash(Backlash { gap: single(gap) }), rotor(inertia)];
             }
             (Kind::ExternalContact, &[x, y, z]) => Effect::ExternalContact(ExternalContact {

@@ -41,7 +41,7 @@ impl Law for TorqueSaturation {
 }
 
 /// Where a coefficient of one, which is what a limit has, ends to be plausible.
-const COEFFICIENT: (f64, f64) = (0.5, 1.5);
+const COEFFICIENT: (f64, f64) = (0.8, 1.2);
 
 /// One column at a limit: the effort beyond it. Coefficient: one.
 pub(crate) fn signature(motion: &Motion, joint: usize, limit: f64) -> Vec<Column> {

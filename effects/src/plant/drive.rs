@@ -2,7 +2,7 @@
 
 /// Resonance of the link on its locked motor once the play is taken up, Hz, where no elasticity says otherwise;
 /// and the damping ratio of that contact.
-const CONTACT: (f64, f64) = (20.0, 0.05);
+pub(crate) const CONTACT: (f64, f64) = (20.0, 0.05);
 
 /// The wind-up δ = motor − link of one joint, both on the joint's side of the gear, and what acts along it.
 #[derive(Debug, Clone, PartialEq)]

@@ -12,6 +12,7 @@ mod residual;
 mod state;
 mod step;
 
+pub(crate) use drive::CONTACT;
 pub(crate) use friction::{Bristle, Direction};
 
 use crate::effect::check;

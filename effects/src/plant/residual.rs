@@ -2,14 +2,9 @@
 
 use super::Plant;
 use crate::Motion;
-use crate::filter::{bristle, first_derivative, first_order, late, second_derivative, side_of_play, smooth};
-use nalgebra::DMatrix;
+use crate::filter::{bristle, first_order, late};
+use crate::wind_up::{Coupling, WindUp, inertia_about};
 
-/// Wind-up of a drive is smoothed to this part of its resonance before it is differentiated: beyond it the torque that
-/// winds the spring cannot be read off a rigid link's motion.
-const BELOW_RESONANCE: f64 = 0.6;
-/// The same, Hz, at most: robots do not move on purpose beyond it.
-const FASTEST: f64 = 12.0;
 /// Times that the torque which winds a spring is computed again on the link's own motion, where the motor's is logged.
 const ROUNDS: usize = 2;
 
@@ -22,13 +17,11 @@ struct Past<'a> {
     bristles: Option<&'a [f64]>,
 }
 
-/// Wind-up of a drive along a run, with its derivatives.
-struct WindUp {
+/// A drive along a run.
+struct Turning {
     joint: usize,
     rotor: f64,
-    angle: Vec<f64>,
-    rate: Vec<f64>,
-    acceleration: Vec<f64>,
+    ahead: WindUp,
 }
 
 impl Plant {
@@ -48,10 +41,10 @@ impl Plant {
     /// Residual torque of a whole measured run, joint-major like its signals, N m (N): [`Plant::residual`] with all that a
     /// sample does not show. Efforts are delayed and lagged, bristles bend, drives warm up and contacts push as the run has it.
     ///
-    /// An elastic drive's motor turns ahead of its link by δ = τ_l/k (δ lags by d/k under damping) and half its play on the
-    /// side that it pushes, where τ_l is the torque that the link takes: the rotor then takes J δ̈ more than with a rigid
-    /// drive (Spong, J. Dyn. Sys. 109(4) 1987). Where the motor's position is logged, the link's is that less δ.
-    /// Valid below the drive's resonance.
+    /// An elastic drive's motor turns ahead of its link by the wind-up δ, and its rotor takes J δ̈ more than with a rigid drive
+    /// (Spong, J. Dyn. Sys. 109(4) 1987). With the link's position logged, a spring is wound by the torque that the link is
+    /// seen to take, and play is crossed as the logged effort drives the rotor. With the motor's logged, the link swings
+    /// behind it as its inertia and the joint have it, and every joint takes the torque of that motion.
     pub fn residuals(&mut self, motion: &Motion) -> Vec<Vec<f64>> {
         let tau: Vec<Vec<f64>> = motion
             .tau
@@ -71,15 +64,15 @@ impl Plant {
         let mut rest = self.run(motion, &tau, &bristles, &[]);
         let turns = |plant: &Plant, d: usize| plant.drives[d].rotor > 0.0 || plant.motor_encoders;
         if (0..self.drives.len()).any(|d| turns(self, d)) {
-            let mut wind_up = self.wind_ups(motion, &tau, &rest);
+            let mut turning = self.turning(motion, &tau, &rest, &[]);
             if self.motor_encoders {
                 for _ in 0..ROUNDS {
-                    rest = self.run(motion, &tau, &bristles, &wind_up);
-                    wind_up = self.wind_ups(motion, &tau, &rest);
+                    rest = self.run(motion, &tau, &bristles, &turning);
+                    turning = self.turning(motion, &tau, &rest, &turning);
                 }
             } else {
-                for drive in &wind_up {
-                    for (rest, acceleration) in rest[drive.joint].iter_mut().zip(&drive.acceleration) {
+                for drive in &turning {
+                    for (rest, acceleration) in rest[drive.joint].iter_mut().zip(&drive.ahead.acceleration) {
                         *rest -= drive.rotor * acceleration;
                     }
                 }
@@ -91,8 +84,8 @@ impl Plant {
         rest
     }
 
-    /// One pass over a run, the gain not yet divided by, with links behind their logged motors by `wind_up`.
-    fn run(&mut self, motion: &Motion, tau: &[Vec<f64>], bristles: &[Vec<f64>], wind_up: &[WindUp]) -> Vec<Vec<f64>> {
+    /// One pass over a run, the gain not yet divided by, with links behind their logged motors.
+    fn run(&mut self, motion: &Motion, tau: &[Vec<f64>], bristles: &[Vec<f64>], turning: &[Turning]) -> Vec<Vec<f64>> {
         let n = motion.q.len();
         let mut out = vec![Vec::with_capacity(motion.len()); n];
         let [mut q, mut v, mut a, mut effort, mut rest] = std::array::from_fn(|_| vec![0.0; n]);
@@ -101,51 +94,48 @@ impl Plant {
             for j in 0..n {
                 (q[j], v[j], a[j], effort[j]) = (motion.q[j][k], motion.v[j][k], motion.a[j][k], tau[j][k]);
             }
-            for drive in wind_up {
-                q[drive.joint] -= drive.angle[k];
-                v[drive.joint] -= drive.rate[k];
-                a[drive.joint] -= drive.acceleration[k];
+            for drive in turning {
+                q[drive.joint] -= drive.ahead.angle[k];
+                v[drive.joint] -= drive.ahead.rate[k];
+                a[drive.joint] -= drive.ahead.acceleration[k];
             }
             bent.iter_mut().zip(bristles).for_each(|(b, run)| *b = run[k]);
             let past = Past { time: motion.start + k as f64 * motion.dt, bristles: Some(&bent) };
             self.rest(&q, &v, &a, &effort, motion.standstill, &past, &mut rest);
-            for drive in wind_up {
+            for drive in turning {
                 // The rotor turns as the motor does, ahead of the link.
-                rest[drive.joint] -= drive.rotor * drive.acceleration[k];
+                rest[drive.joint] -= drive.rotor * drive.ahead.acceleration[k];
             }
             out.iter_mut().zip(&rest).for_each(|(out, rest)| out.push(*rest));
         }
         out
     }
 
-    /// Wind-up of every drive under the torque that its link takes: the effort delivered less the rest and the rotor's part.
-    fn wind_ups(&mut self, motion: &Motion, tau: &[Vec<f64>], rest: &[Vec<f64>]) -> Vec<WindUp> {
-        let n = motion.q.len();
-        let middle: Vec<f64> = (0..n).map(|j| motion.q[j].get(motion.len() / 2).copied().unwrap_or(0.0)).collect();
-        let mut mass = DMatrix::zeros(n, n);
-        self.model.mass_matrix(&mut self.data, &middle, &mut mass);
-        self.drives
-            .iter()
-            .map(|drive| {
-                let j = drive.joint;
-                let torque: Vec<f64> = (0..motion.len())
-                    .map(|k| self.actuation.at_joint(j, tau[j][k]) - rest[j][k] - drive.rotor * motion.a[j][k])
-                    .collect();
-                let resonance = (drive.stiffness / mass[(j, j)]).sqrt() / std::f64::consts::TAU;
-                let wound: Vec<f64> = torque.iter().map(|t| t / drive.stiffness).collect();
-                let mut angle = first_order(&wound, drive.damping / drive.stiffness, motion.dt);
-                if drive.half_gap > 0.0 {
-                    angle.iter_mut().zip(side_of_play(&torque)).for_each(|(a, side)| *a += drive.half_gap * side);
-                }
-                // −3 dB of the raised cosine lies at 0.36 over its half-width.
-                let angle = smooth(&angle, 0.36 / (BELOW_RESONANCE * resonance).min(FASTEST), motion.dt);
-                WindUp {
-                    joint: j,
-                    rotor: drive.rotor,
-                    rate: first_derivative(&angle, motion.dt),
-                    acceleration: second_derivative(&angle, motion.dt),
-                    angle,
-                }
+    /// Wind-up of every drive; `before` as it was taken to be when `rest` was computed, where the motors are logged.
+    fn turning(&mut self, motion: &Motion, tau: &[Vec<f64>], rest: &[Vec<f64>], before: &[Turning]) -> Vec<Turning> {
+        (0..self.drives.len())
+            .map(|d| {
+                let drive = &self.drives[d];
+                let (j, rotor) = (drive.joint, drive.rotor);
+                let coupling =
+                    Coupling { stiffness: drive.stiffness, damping: drive.damping, half_gap: drive.half_gap };
+                let delivered = |k: usize| self.actuation.at_joint(j, tau[j][k]);
+                // The torque that the link takes: the effort less the rest and the rotor's part.
+                let link = |k: usize| delivered(k) - rest[j][k] - rotor * motion.a[j][k];
+                let ahead = if self.motor_encoders {
+                    let inertia = inertia_about(&self.model, &mut self.data, motion, j);
+                    let forced: Vec<f64> = (0..motion.len())
+                        .map(|k| link(k) + before.get(d).map_or(0.0, |b| inertia[k] * b.ahead.acceleration[k]))
+                        .collect();
+                    WindUp::forced(&forced, &inertia, &coupling, motion.dt)
+                } else if coupling.half_gap > 0.0 && rotor > 0.0 {
+                    let forced: Vec<f64> = (0..motion.len()).map(|k| delivered(k) - rotor * motion.a[j][k]).collect();
+                    WindUp::forced(&forced, &vec![rotor; motion.len()], &coupling, motion.dt)
+                } else {
+                    let wound: Vec<f64> = (0..motion.len()).map(|k| link(k) / coupling.stiffness).collect();
+                    WindUp::of(first_order(&wound, coupling.damping / coupling.stiffness, motion.dt), motion.dt)
+                };
+                Turning { joint: j, rotor, ahead }
             })
             .collect()
     }

@@ -50,6 +50,8 @@ const EDGE: f64 = 0.15;
 const MISFIT: i32 = 4;
 /// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
 const MANY: usize = 3;
+/// Another account of a drive is better where it leaves this part of the gap.
+const BETTER: f64 = 0.95;
 /// Poses of an episode that an inertia is the mean of.
 const POSES: usize = 50;
 /// Times that the choice is made, each around the exact parameters of the one before.
@@ -286,6 +288,10 @@ impl Logs<'_> {
                 best = (after, linear);
             }
         }
+        if judged(best.0).leaves_any() {
+            let chosen = self.drives(best.1)?;
+            best = (left(&chosen)?, chosen);
+        }
         if best.1.fit.set.is_empty() || best.0 < before {
             if judged(best.0).leaves_most() {
                 return self.constant(best.1);
@@ -299,6 +305,58 @@ impl Logs<'_> {
         let choice = select::evaluate(&chosen.all, Vec::new());
         let (exact, fit) = self.data(&chosen.noise).refine(&[])?;
         Ok(Chosen { choice, exact, fit, ..chosen })
+    }
+
+    /// Tries the other accounts of the one drive or rotor that was found, each at its exact parameters: a spring or play, the
+    /// encoder on either side. The first look, to first order, may take one for another, or for a rotor alone. Play chatters at times as no simulation follows: the typical stretch of time is what counts.
+    fn drives(&self, mut best: Chosen) -> Result<Chosen, EffectError> {
+        let turns = |kind: Kind| matches!(kind, Kind::JointElasticity | Kind::Backlash);
+        let kind_of = |c: usize| best.all.entries[c].candidate.kind;
+        let of = |pick: &dyn Fn(Kind) -> bool| -> Vec<usize> {
+            best.choice.set.iter().copied().filter(|&c| pick(kind_of(c))).collect()
+        };
+        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
+        let squares = |chosen: &Chosen| -> Result<Vec<Vec<f64>>, EffectError> {
+            let rows = self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows;
+            Ok(gap::squares(&self.band, &rows, |_| true))
+        };
+        let place = match (of(&turns).as_slice(), of(&|kind| kind == Kind::Armature).as_slice()) {
+            (&[one], _) | (&[], &[one]) => one,
+            _ => return Ok(best),
+        };
+        let drive = best.all.entries[place].candidate.clone();
+        let rest: Vec<usize> = best.choice.set.iter().copied().filter(|&c| c != place).collect();
+        let mut seen = vec![(drive.kind, drive.side)];
+        let mut others = Vec::new();
+        for (c, entry) in best.all.entries.iter().enumerate() {
+            let other = &entry.candidate;
+            if turns(other.kind) && other.joints == drive.joints && !seen.contains(&(other.kind, other.side)) {
+                seen.push((other.kind, other.side));
+                others.push(c);
+            }
+        }
+        let mut least = BETTER * gap::typical(&squares(&best)?, &weights);
+        for c in others {
+            let mut set: Vec<usize> = rest.iter().copied().chain([c]).collect();
+            set.sort_unstable();
+            let (exact, fit) = self.data(&best.noise).refine(&self.candidates(&best.all, &set))?;
+            let physical = fit.effects(&exact, self.model).iter().any(|e| turns(e.kind()));
+            let choice = select::evaluate(&best.all, set);
+            let chosen = Chosen { all: best.all.clone(), choice, exact, fit, noise: best.noise.clone() };
+            let typical = gap::typical(&squares(&chosen)?, &weights);
+            eprintln!(
+                "drive {:?} {:?} {:?} {:.3}: {typical:.4} of {least:.4}",
+                chosen.all.entries[c].candidate.kind,
+                chosen.all.entries[c].candidate.joints,
+                chosen.all.entries[c].candidate.side,
+                chosen.all.entries[c].candidate.shape
+            );
+            if physical && typical < least {
+                least = BETTER * typical;
+                best = chosen;
+            }
+        }
+        Ok(best)
     }
 
     /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first.
@@ -494,7 +552,10 @@ impl Logs<'_> {
         let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, counts)), &concern);
         let floor_of_concern =
             gap::weighted_rms(&floor.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &concern);
-        let judged = verdict::Judged { before: rms(&before.rows), after: rms(&after.rows), floor: floor_of_concern };
+        let typical = |rows: &Rows| gap::typical(&gap::squares(&self.band, rows, counts), &concern);
+        let chatters = effects.iter().any(|e| e.kind() == Kind::Backlash);
+        let size = |rows: &Rows| if chatters { typical(rows) } else { rms(rows) };
+        let judged = verdict::Judged { before: size(&before.rows), after: size(&after.rows), floor: floor_of_concern };
         let unexplained = judged.unexplained_fraction();
         let verdict = judged.verdict(effects.is_empty());
         let misfit = if verdict == Verdict::Explained { 0.0 } else { unexplained };

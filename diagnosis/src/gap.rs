@@ -63,6 +63,13 @@ pub fn squares(band: &Band, rows: &Rows, keep: impl Fn(usize) -> bool) -> Vec<Ve
     sums
 }
 
+/// Weighted root mean square of the block in the middle: deaf to the few blocks in which something jolts.
+pub fn typical(blocks: &[Vec<f64>], weights: &[f64]) -> f64 {
+    let mut each: Vec<f64> = blocks.iter().map(|block| weighted_rms(block, weights)).collect();
+    each.sort_by(f64::total_cmp);
+    each.get(each.len() / 2).copied().unwrap_or(0.0)
+}
+
 /// Adds up blocks.
 pub fn total(blocks: &[Vec<f64>]) -> Vec<f64> {
     let mut sum = vec![0.0; blocks.first().map_or(0, Vec::len)];

@@ -35,9 +35,15 @@ impl Judged {
         ((self.after.powi(2) - self.floor.powi(2)) / self.before.powi(2)).clamp(0.0, 1.0)
     }
 
+    /// Whether what is left is more than noise.
+    pub fn leaves_any(&self) -> bool {
+        self.after > NEAR_FLOOR * self.floor
+    }
+
     /// Whether what is left is more than noise and more than explained gaps leave.
     pub fn leaves_much(&self) -> bool {
-        self.after > (NEAR_FLOOR * self.floor).max(IMMATERIAL_GAP)
+        self.leaves_any()
+            && self.after > IMMATERIAL_GAP
             && (self.unexplained_fraction() > EXPLAINED || self.after > MATERIAL_GAP)
     }
 

@@ -53,24 +53,6 @@ fn differences(x: &[f64], of: impl Fn(f64, f64, f64) -> f64) -> Vec<f64> {
     out
 }
 
-/// A signal through a raised cosine of the given half-width, s; the window shrinks towards the ends.
-pub(crate) fn smooth(x: &[f64], half_width: f64, dt: f64) -> Vec<f64> {
-    let reach = (half_width / dt).round() as usize;
-    let weights: Vec<f64> =
-        (0..=reach).map(|i| 0.5 + 0.5 * (std::f64::consts::PI * i as f64 / (reach + 1) as f64).cos()).collect();
-    (0..x.len())
-        .map(|k| {
-            let reach = reach.min(k).min(x.len() - 1 - k);
-            let (mut sum, mut total) = (weights[0] * x[k], weights[0]);
-            for (i, w) in weights.iter().enumerate().take(reach + 1).skip(1) {
-                sum += w * (x[k - i] + x[k + i]);
-                total += 2.0 * w;
-            }
-            sum / total
-        })
-        .collect()
-}
-
 /// Deflection of a bristle over its greatest one, -1 to 1, along a measured motion that starts with it relaxed:
 /// Dahl's law dw/dt = κ (v - abs(v) w) with κ = σ/f in 1/rad, by the implicit Euler rule.
 pub(crate) fn bristle(v: &[f64], stiffness: f64, dt: f64) -> Vec<f64> {
@@ -81,16 +63,6 @@ pub(crate) fn bristle(v: &[f64], stiffness: f64, dt: f64) -> Vec<f64> {
             w
         })
         .collect()
-}
-
-/// Torque under this part of its root mean square does not say on which side of its play a gear is.
-const UNDECIDED: f64 = 0.05;
-
-/// On which side of its play a gear is under a torque: 1, -1, or between while the torque passes through zero.
-pub(crate) fn side_of_play(torque: &[f64]) -> Vec<f64> {
-    let rms = (torque.iter().map(|t| t * t).sum::<f64>() / torque.len().max(1) as f64).sqrt();
-    let width = (UNDECIDED * rms).max(f64::MIN_POSITIVE);
-    torque.iter().map(|t| (t / width).clamp(-1.0, 1.0)).collect()
 }
 
 #[cfg(test)]
@@ -136,13 +108,5 @@ mod tests {
         let w = bristle(&v, 50.0, DT);
         assert_relative_eq!(w[0], 50.0 * 0.1 * DT, max_relative = 0.02);
         assert_relative_eq!(w[3999], 1.0, epsilon = 1e-6);
-    }
-
-    #[test]
-    fn smoothing_keeps_lines_inside_and_constants_to_the_ends() {
-        let line: Vec<f64> = (0..300).map(|k| k as f64).collect();
-        for (a, b) in smooth(&line, 0.05, DT).iter().zip(&line) {
-            assert_relative_eq!(a, b, epsilon = 1e-9);
-        }
     }
 }

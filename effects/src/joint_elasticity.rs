@@ -62,21 +62,28 @@ pub(crate) const RATIO: f64 = 0.05;
 /// Two columns at a resonance of the link on its locked motor, Hz: the rotor's, and what the wind-up adds, by the encoder's
 /// side.
 ///
-/// On the link's side the rotor turns ahead by the torque that the nominal link takes over the stiffness: coefficients J and
-/// J/k. On the motor's side the nominal link swings behind: coefficients J and one, or by how much softer the joint is.
+/// On the link's side the rotor turns ahead by the torque that the link takes over the stiffness: coefficients J and J/k. On
+/// the motor's side the link swings behind: coefficients J and one, or by how much softer the joint is.
 pub(crate) fn signature(motion: &Motion, joint: usize, resonance: f64, side: EncoderSide) -> Vec<Column> {
+    let inertia = inertia_about(motion.model, &mut Data::new(motion.model), motion, joint);
+    let torque = link_torque(motion, joint, &inertia);
     match side {
         EncoderSide::Link => {
             let lag = 2.0 * RATIO / (std::f64::consts::TAU * resonance);
-            let torque = first_order(&motion.nominal[joint], lag, motion.dt);
-            ahead(motion, joint, WindUp::of(torque, motion.dt).acceleration)
+            ahead(motion, joint, WindUp::of(first_order(&torque, lag, motion.dt), motion.dt).acceleration)
         }
         EncoderSide::Motor => {
-            let inertia = inertia_about(motion.model, &mut Data::new(motion.model), motion, joint);
             let coupling = Coupling::resonant(mean(&inertia), resonance, RATIO);
-            behind(motion, joint, &WindUp::forced(&motion.nominal[joint], &inertia, &coupling, motion.dt))
+            behind(motion, joint, &WindUp::forced(&torque, &inertia, &coupling, motion.dt))
         }
     }
+}
+
+/// The torque that a link takes of a drive with a rotor as heavy as itself: what it rubs or lifts beside the nominal robot
+/// winds the spring too, and is in the effort.
+pub(crate) fn link_torque(motion: &Motion, joint: usize, inertia: &[f64]) -> Vec<f64> {
+    let own = inertia.iter().zip(&motion.a[joint]).zip(&motion.tau[joint]);
+    own.map(|((inertia, a), tau)| tau - inertia * a).collect()
 }
 
 pub(crate) fn mean(x: &[f64]) -> f64 {

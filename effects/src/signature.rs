@@ -86,9 +86,9 @@ const DRIFT: [f64; 5] = [0.06, 0.15, 0.35, 0.8, 2.0];
 /// Limits over the torque that the motion takes at most: a limit that is reached is delivered, and no more than it.
 const LIMIT: [f64; 9] = [0.75, 0.85, 0.92, 0.97, 1.0, 1.04, 1.1, 1.2, 1.4];
 /// Resonances of a link on its locked motor, Hz.
-const RESONANCE: [f64; 4] = [2.5, 4.5, 8.0, 14.0];
+const RESONANCE: [f64; 3] = [8.0, 4.5, 2.5];
 /// Gaps of a play, rad or m.
-const GAP: [f64; 2] = [0.01, 0.03];
+const GAP: [f64; 2] = [0.02, 0.008];
 /// Delays and lags, s.
 const LATE: [f64; 4] = [0.002, 0.006, 0.012, 0.025];
 /// Cycles of a ripple: at least one and a half over the span; above that by this part of what the span resolves.

@@ -85,22 +85,28 @@ impl WindUp {
     }
 }
 
-/// Time between two evaluations of an inertia, s: it changes with the pose.
-const EVERY: f64 = 0.03;
+/// Time between two evaluations of an inertia, s: it changes with the pose, and is linear between.
+const EVERY: f64 = 0.02;
 
 /// Inertia of a robot about one joint along a motion, the other joints held, sample by sample, kg m² (kg).
 pub(crate) fn inertia_about(model: &Model, data: &mut Data, motion: &Motion, joint: usize) -> Vec<f64> {
     let n = model.dof();
     let stride = ((EVERY / motion.dt) as usize).max(1);
-    let (mut q, mut mass, mut inertia) = (vec![0.0; n], DMatrix::zeros(n, n), 0.0);
-    (0..motion.len())
-        .map(|k| {
-            if k % stride == 0 {
-                q.iter_mut().zip(motion.q).for_each(|(q, joint)| *q = joint[k]);
-                model.mass_matrix(data, &q, &mut mass);
-                inertia = mass[(joint, joint)];
-            }
-            inertia
-        })
-        .collect()
+    let (mut q, mut mass) = (vec![0.0; n], DMatrix::zeros(n, n));
+    let mut at = |k: usize| {
+        q.iter_mut().zip(motion.q).for_each(|(q, joint)| *q = joint[k]);
+        model.mass_matrix(data, &q, &mut mass);
+        mass[(joint, joint)]
+    };
+    let Some(last) = motion.len().checked_sub(1) else { return Vec::new() };
+    let mut inertia = Vec::with_capacity(motion.len());
+    let mut here = at(0);
+    for begin in (0..=last).step_by(stride) {
+        let end = (begin + stride).min(last);
+        let there = at(end);
+        let slope = (there - here) / (end - begin).max(1) as f64;
+        inertia.extend((begin..(begin + stride).min(last + 1)).map(|k| here + slope * (k - begin) as f64));
+        here = there;
+    }
+    inertia
 }

@@ -204,3 +204,73 @@ fn two_milliseconds_are_short_enough() {
     );
     assert!(rigid < 2e-5 && soft < 5e-5 && loose < 1e-3 && both < 1e-5 && bristles < 2e-3);
 }
+
+/// What plants leave of the log of a pendulum, root mean square over the second joint's torque: the rigid one, and the one
+/// that has the effects. Jolts aside: the half of the samples on which least is left.
+fn left_of_a_log(effects: &[Effect], motor: bool) -> (f64, f64) {
+    let model = pendulum();
+    let plant = |effects: &[Effect]| {
+        let plant = Plant::new(&model, effects, DT).unwrap();
+        if motor { plant.with_motor_encoders() } else { plant }
+    };
+    let mut run = Run::new(&model, effects, DT);
+    if motor {
+        run.plant = run.plant.with_motor_encoders();
+    }
+    let samples = 6000;
+    let (mut q, mut tau) = (vec![vec![]; 2], vec![vec![]; 2]);
+    for k in 0..samples {
+        let t = f64::from(k) * DT;
+        let effort = [0.4 * (1.3 * t).cos(), 0.6 * (2.1 * t).sin() + 0.2 * (7.0 * t).cos()];
+        (0..2).for_each(|j| {
+            q[j].push(run.x[j]);
+            tau[j].push(effort[j]);
+        });
+        run.step(&effort);
+    }
+    // Positions stand at the beginning of the interval over which an effort is held: the mean over two is the effort there.
+    let middle = |x: &Vec<f64>| (1..x.len() - 1).map(|k| x[k]).collect::<Vec<f64>>();
+    let v: Vec<Vec<f64>> = q.iter().map(|q| q.windows(3).map(|w| (w[2] - w[0]) / (2.0 * DT)).collect()).collect();
+    let a: Vec<Vec<f64>> =
+        q.iter().map(|q| q.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]) / (DT * DT)).collect()).collect();
+    let tau: Vec<Vec<f64>> = tau.iter().map(|x| x.windows(3).map(|w| 0.5 * (w[0] + w[1])).collect()).collect();
+    let q: Vec<Vec<f64>> = q.iter().map(middle).collect();
+    let motion = Motion {
+        model: &model,
+        q: &q,
+        v: &v,
+        a: &a,
+        tau: &tau,
+        nominal: &q,
+        held: None,
+        dt: DT,
+        start: 0.0,
+        pushed: &[],
+        standstill: &[1e-6, 1e-6],
+    };
+    let rms = |mut plant: Plant| {
+        let mut size: Vec<f64> = plant.residuals(&motion)[1].iter().map(|x| x * x).collect();
+        size.sort_by(f64::total_cmp);
+        size.truncate(size.len() / 2);
+        (size.iter().sum::<f64>() / size.len() as f64).sqrt()
+    };
+    (rms(plant(&[])), rms(plant(effects)))
+}
+
+#[test]
+fn a_log_of_an_elastic_drive_leaves_nothing_to_its_own_plant() {
+    for motor in [false, true] {
+        let (rigid, elastic) = left_of_a_log(&elastic("joint2", 30.0, 0.1, 0.05), motor);
+        assert!(elastic < 0.03 * rigid, "motor {motor}: {elastic} of {rigid}");
+    }
+}
+
+#[test]
+fn a_log_of_play_leaves_little_to_its_own_plant() {
+    for motor in [false, true] {
+        let mut effects = elastic("joint2", 300.0, 0.3, 0.05).to_vec();
+        effects.extend(play("joint2", 0.02, 0.0).into_iter().take(1));
+        let (rigid, play) = left_of_a_log(&effects, motor);
+        assert!(play < 0.1 * rigid, "motor {motor}: {play} of {rigid}");
+    }
+}

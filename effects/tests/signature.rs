@@ -127,13 +127,7 @@ fn coefficients(draw: &mut Draw, model: &Model, candidate: &Candidate, columns: 
 }
 
 /// Kinds whose columns are exact to first order only, or that one sample does not show.
-const INEXACT: [Kind; 5] = [
-    Kind::LoadDependentFriction,
-    Kind::GravityMisalignment,
-    Kind::JointZeroOffset,
-    Kind::JointElasticity,
-    Kind::Backlash,
-];
+const INEXACT: [Kind; 3] = [Kind::LoadDependentFriction, Kind::GravityMisalignment, Kind::JointZeroOffset];
 
 /// Every candidate whose columns are exact, sample by sample.
 fn columns_are_what_the_effect_adds(model: &Model, draw: &mut Draw) {
@@ -272,15 +266,14 @@ fn coefficients_at_their_bounds_are_effects_that_the_plant_takes() {
 fn a_robot_offers_every_kind_where_it_can_be() {
     for (name, joints) in robots::NAMES.into_iter().zip([7, 6, 2]) {
         let all = Candidate::all(&robot(name));
-        // Eight laws a joint and one of its link or flange, elasticity and play by two encoders' sides, one base, and two
-        // signs of a coupling for each pair of neighbours.
-        assert_eq!(all.len(), (8 + 1 + 2 * 2) * joints + 1 + 2 * (joints - 1), "{name}");
+        // Eight laws a joint and one of its link or flange, one base, and two signs of a coupling for each pair of neighbours.
+        assert_eq!(all.len(), (8 + 1) * joints + 1 + 2 * (joints - 1), "{name}");
         assert_eq!(
             all.iter().filter(|c| c.kind == Kind::Payload).map(|c| c.joints[0]).collect::<Vec<_>>(),
             [joints - 1]
         );
         let kinds: BTreeSet<Kind> = all.iter().map(|c| c.kind).collect();
-        let more = [Kind::LoadDependentFriction, Kind::JointZeroOffset, Kind::JointElasticity, Kind::Backlash];
+        let more = [Kind::LoadDependentFriction, Kind::JointZeroOffset];
         assert_eq!(kinds, Kind::LINEAR.into_iter().chain(more).collect(), "{name}");
         for (i, a) in all.iter().enumerate() {
             assert!(!all[..i].contains(a), "{name}: {a:?} twice");

@@ -6,7 +6,7 @@ use crate::filter::{bristle, first_order, late};
 use crate::wind_up::{Coupling, WindUp, inertia_about};
 
 /// Times that the torque which winds a spring is computed again on the link's own motion, where the motor's is logged.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 1;
 
 /// What one sample needs to know beyond itself.
 #[derive(Default)]

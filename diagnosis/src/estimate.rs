@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// What sampling, integration and the laws themselves leave of any parameter, as a part of it; no number of rows averages
 /// that out.
-const SYSTEMATIC: f64 = 1e-3;
+const SYSTEMATIC: f64 = 3e-3;
 /// Step of the numerical derivative from coefficients to parameters, in standard errors.
 const STEP: f64 = 1e-3;
 

@@ -157,6 +157,7 @@ fn bounds(text: &mut String, name: &str, bound: &BoundGrowth) {
     );
     for i in shown(bound.horizons.len()) {
         let (truth, tight, loose) = (bound.truth[i], bound.tight[i], bound.loose[i]);
+        let large = |value: f64| if value.is_finite() { figure(value) } else { "over 10³⁰⁸".into() };
         let _ = writeln!(
             text,
             "  {}{}{}{}{}{}",
@@ -164,8 +165,8 @@ fn bounds(text: &mut String, name: &str, bound: &BoundGrowth) {
             fill(&figure(truth), 16),
             fill(&figure(tight), 16),
             fill(&figure(tight / truth), 12),
-            fill(&figure(loose), 18),
-            fill(&figure(loose / truth), 14)
+            fill(&large(loose), 18),
+            fill(&large(loose / truth), 14)
         );
     }
 }

@@ -10,10 +10,10 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Line styles that only this page needs.
 const EXTRA: &str = ".line.hybrid { stroke: var(--other); } .line.pure { stroke: var(--good); stroke-dasharray: 7 4; } \
-    .line.tight { stroke: var(--ink); } .line.loose { stroke: var(--floor); stroke-dasharray: 5 4; } \
+    .line.tight { stroke: var(--ink); } .line.loose { stroke: var(--dot); stroke-dasharray: 5 4; } \
     .band, .band.after { opacity: .14; } .band.before { fill: var(--before); } .band.hybrid { fill: var(--other); } .band.pure { fill: var(--good); } \
-    .swatch.hybrid { background: var(--other); } .swatch.pure { background: var(--good); } \
-    .swatch.tight { background: var(--ink); } .swatch.loose { background: var(--floor); }";
+    .swatch.hybrid { background: var(--other); } .swatch.tight { background: var(--ink); height: .15rem; vertical-align: .2rem; } \
+    .swatch.pure, .swatch.loose { height: 0; border-top: .2rem dashed var(--good); vertical-align: .18rem; } .swatch.loose { border-color: var(--dot); }";
 
 /// The page as self-contained HTML.
 pub fn page(models: &[ModelRollouts], robot: &str, joints: &[String], options: &RolloutOptions) -> String {
@@ -73,7 +73,7 @@ fn look(model: &ModelRollouts) -> (&'static str, &'static str) {
 fn legend(models: &[ModelRollouts]) -> Markup {
     html! {
         span.legend {
-            @for (class, name) in models.iter().map(look) { span class={ "swatch " (class) } {} " " (name) " " }
+            @for (class, name) in models.iter().map(look) { span class={ "swatch " (class) } {} " " (name) }
             "; median, and from the 10th to the 90th percentile of the starts"
         }
     }
@@ -141,7 +141,8 @@ fn bounds(model: &ModelRollouts) -> Markup {
         bound.horizons.iter().copied().zip(values.iter().copied()).map(|(h, v)| [h, v]).collect()
     };
     let x = Axis::powers(bound.horizons.iter().copied(), "horizon, s");
-    let all = bound.truth.iter().chain(&bound.tight).chain(&bound.loose).copied();
+    // The loose bound leaves the frame: no axis shows it and the truth.
+    let all = bound.truth.iter().chain(&bound.tight).copied().chain(bound.tight.last().map(|most| 10.0 * most));
     let y = Axis::powers(all, &format!("√(qᵀMq + ({} s)² vᵀMv)/√m, rad or m", plain(bound.time)));
     html! {
         figure {
@@ -169,11 +170,12 @@ fn sentence(bound: &BoundGrowth) -> String {
     else {
         return String::new();
     };
+    let times = |bound: f64| if bound.is_finite() { figure(bound / truth) } else { "over 10³⁰⁸".into() };
     format!(
         "At {} s the tight bound is {} times the truth, the loose one {} times. One step of {} s: δ {} (median), {} (largest); L {}.",
         plain(*horizon),
-        figure(tight / truth),
-        figure(loose / truth),
+        times(*tight),
+        times(*loose),
         plain(bound.step),
         figure(bound.delta.median),
         figure(bound.delta.most),

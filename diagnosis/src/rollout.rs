@@ -23,8 +23,8 @@ const POINTS: usize = 512;
 const TIMES: [f64; 9] = [0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0];
 /// How far rollouts are followed for that, s.
 const NEAR: f64 = 0.02;
-/// How far a model's own step may be from a whole number of samples, as a part of it.
-const WHOLE: f64 = 1e-4;
+/// How far a model's own step may be from a whole number of samples, as a part of it: 1 ms after 1 s.
+const WHOLE: f64 = 1e-3;
 
 /// What is asked of [`rollouts`].
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -99,13 +99,13 @@ fn summary(robot: &str, models: &[ModelRollouts], options: &RolloutOptions) -> S
     text.push('\n');
     for model in models {
         let leaves = |t: f64| {
-            if t.is_finite() { format!("{} s", plain(t)) } else { format!("not within {} s", plain(options.horizon)) }
+            if t.is_finite() { format!("after {} s", plain(t)) } else { format!("not within {} s", plain(options.horizon)) }
         };
         let rate = model.growth.rate.map_or("–".into(), figure);
         let quantiles = model.growth.leaves;
         let _ = writeln!(
             text,
-            "{} leaves {} rad after {} (10 %: {}); grows by {rate} e-folds a second",
+            "{} leaves {} rad {} (10 %: {}); grows by {rate} e-folds a second",
             pad(model.name, 10),
             plain(options.tolerance),
             leaves(quantiles.median),

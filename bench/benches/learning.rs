@@ -4,12 +4,14 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use gapscope_dynamics::{Discrete, Integrator, Model, StepModel};
 use gapscope_network::{Activation, Adam, AdamSettings, Init, Loss, LossPass, Mlp, Net, Real};
-use gapscope_residual::{Alarm, Hybrid, HybridBatch, On, explained_share};
+use gapscope_residual::{Alarm, Hybrid, On, explained_share};
 use std::hint::black_box;
 
 const SIZES: [usize; 4] = [21, 128, 128, 14];
 const DT: f64 = 0.01;
 const BATCH: usize = 1024;
+/// States stepped together, as in rollouts.
+const BLOCK: usize = 64;
 
 fn arm() -> Model {
     Model::from_urdf(include_str!("../../dynamics/robots/arm7.urdf")).unwrap().model
@@ -39,9 +41,13 @@ fn f_hyb(c: &mut Criterion) {
 
 type Group<'a> = criterion::BenchmarkGroup<'a, criterion::measurement::WallTime>;
 
-fn one<T: Real>(group: &mut Group<'_>, name: &str) {
+fn hybrid<T: Real>() -> Hybrid<Discrete, Net<T>> {
     let physics = Discrete::new(arm(), DT, Integrator::SemiImplicitEuler);
-    let mut hybrid = Hybrid::new(physics, Net::new(network::<T>()), On::NextState).unwrap();
+    Hybrid::new(physics, Net::new(network::<T>()), On::NextState).unwrap()
+}
+
+fn one<T: Real>(group: &mut Group<'_>, name: &str) {
+    let mut hybrid = hybrid::<T>();
     let (start, tau) = (numbers(14, 0.1), numbers(7, 0.4));
     let mut x = start.clone();
     group.bench_function(format!("one/{name}"), |b| {
@@ -53,13 +59,15 @@ fn one<T: Real>(group: &mut Group<'_>, name: &str) {
 }
 
 fn many<T: Real>(group: &mut Group<'_>, name: &str) {
-    let mut hybrid = HybridBatch::new(arm(), DT, network::<T>()).unwrap();
+    let mut hybrid = hybrid::<T>();
     let (start, tau) = (numbers(BATCH * 14, 0.1), numbers(BATCH * 7, 0.4));
     let mut x = start.clone();
     group.bench_function(format!("{BATCH}/{name}"), |b| {
         b.iter(|| {
             x.copy_from_slice(&start);
-            hybrid.step(black_box(&mut x), black_box(&tau));
+            for (x, tau) in x.chunks_mut(BLOCK * 14).zip(tau.chunks(BLOCK * 7)) {
+                hybrid.step_batch(black_box(x), black_box(tau));
+            }
         })
     });
 }

@@ -6,7 +6,7 @@ use crate::schema::{Change, HorizonChange, RolloutGap, StateGap};
 use crate::signals::Signals;
 use gapscope_dynamics::{Model, StepModel};
 use gapscope_effects::Plant;
-use gapscope_rollout::{Start, Trajectory, horizon_errors};
+use gapscope_rollout::{Initial, horizon_errors};
 
 /// Horizons of rollouts, s.
 pub const HORIZONS: [f64; 5] = [0.05, 0.1, 0.25, 0.5, 1.0];
@@ -50,12 +50,10 @@ pub fn errors(signals: &[Signals], band: &Band, joints: usize, plant: impl Fn(f6
             one_step(s, &mine, &mut plant(s.dt, fold), &mut errors);
             // Starts and ends stay inside the fold, so that nothing of a rollout was seen by the fit.
             let every = ((between / s.dt).round() as usize).max(1);
-            let starts: Vec<Start> = (first.center..=last.center)
-                .step_by(every)
-                .map(|sample| Start { sample, velocity: (0..joints).map(|j| s.v[j][sample]).collect() })
-                .collect();
+            let trajectory = s.trajectory();
+            let starts: Vec<Initial> =
+                (first.center..=last.center).step_by(every).map(|sample| trajectory.initial(sample)).collect();
             let horizons: Vec<usize> = HORIZONS.iter().map(|h| ((h / s.dt).round() as usize).max(1)).collect();
-            let trajectory = Trajectory { effort: &s.effort, position: &s.q, first: s.first, stride: s.stride };
             let found = horizon_errors(|| plant(s.raw.dt, fold), trajectory, &starts, &horizons);
             for (start, rollout) in starts.iter().zip(&found) {
                 let block = mine[mine.partition_point(|r| r.center <= start.sample).saturating_sub(1)].block;
@@ -64,7 +62,7 @@ pub fn errors(signals: &[Signals], band: &Band, joints: usize, plant: impl Fn(f6
                         continue;
                     }
                     if let Some(error) = error {
-                        add(&mut errors.rollout[h][block], error);
+                        add(&mut errors.rollout[h][block], &error[..joints]);
                     }
                 }
             }
@@ -97,7 +95,7 @@ fn one_step(s: &Signals, rows: &[&crate::band::Row], plant: &mut Plant, errors: 
         Signals::gather(&s.tau, k + 1, &mut later);
         // The effort of the interval, under the same kernel as the state at its ends.
         tau.iter_mut().zip(&later).for_each(|(t, l)| *t = 0.5 * (*t + l));
-        plant.start(&q, &v, &mut x);
+        plant.start_at(s.time(k), &q, &v, &mut x);
         plant.step(&mut x, &tau);
         let position: Vec<f64> = (0..n).map(|j| s.q[j][k + 1] - x[j]).collect();
         let velocity: Vec<f64> = (0..n).map(|j| s.v[j][k + 1] - x[n + j]).collect();

@@ -33,4 +33,4 @@ pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};
 pub use diagnose::{Outcome, Progress, diagnose};
 pub use evaluate::{Predictions, evaluate};
 pub use gapscope_effects::EncoderSide;
-pub use rollout::{BoundGrowth, ModelRollouts, RolloutError, RolloutOptions, Rollouts, rollouts};
+pub use rollout::{BoundGrowth, Contender, ModelRollouts, RolloutError, RolloutOptions, rollouts};

@@ -9,6 +9,7 @@ use crate::kernel::{Kernel, apply};
 use gapscope_datasets::{Episode, Uniform, resample};
 use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{Held, Motion};
+use gapscope_rollout::Trajectory;
 
 /// Half-width of the kernel that forms derivatives, s; about 46 Hz.
 const DERIVATIVE_HALF_WIDTH: f64 = 0.010;
@@ -124,6 +125,23 @@ impl Signals {
         self.q.first().map_or(0, Vec::len)
     }
 
+    /// Time of sample `k`, s since the start of the episode.
+    pub fn time(&self, k: usize) -> f64 {
+        (self.first + k * self.stride) as f64 * self.raw.dt
+    }
+
+    /// The motion and the effort that rollouts are held against.
+    pub fn trajectory(&self) -> Trajectory<'_> {
+        Trajectory {
+            dt: self.raw.dt,
+            effort: &self.effort,
+            position: &self.q,
+            velocity: &self.v,
+            first: self.first,
+            stride: self.stride,
+        }
+    }
+
     /// The motion that signatures read.
     pub fn motion<'a>(&'a self, model: &'a Model, standstill: &'a [f64]) -> Motion<'a> {
         Motion {
@@ -140,7 +158,7 @@ impl Signals {
                 weights: &self.held,
             }),
             dt: self.dt,
-            start: self.first as f64 * self.raw.dt,
+            start: self.time(0),
             pushed: &self.pushed,
             standstill,
         }

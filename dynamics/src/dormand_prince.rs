@@ -108,6 +108,11 @@ impl DormandPrince {
         }
     }
 
+    /// Forgets the length of the last step, so that the next integration does not depend on the last one.
+    pub fn forget(&mut self) {
+        self.next = 0.0;
+    }
+
     /// Integrates ẋ = f(t, x) over `span` (s) in place; `rate(t, x, dx)` fills dx, `accepted` sees every step with its
     /// dense output. Returns the number of accepted steps. The first step length is that of the last call, where there was one.
     ///
@@ -214,7 +219,7 @@ impl StepModel for Adaptive {
     fn step(&mut self, x: &mut [f64], tau: &[f64]) {
         let n = self.model.dof();
         // What the last call learnt would make the result depend on it.
-        self.integrator.next = 0.0;
+        self.integrator.forget();
         let (model, data) = (&self.model, &mut self.data);
         let rate = |_: f64, x: &[f64], dx: &mut [f64]| {
             dx[..n].copy_from_slice(&x[n..]);

@@ -28,6 +28,14 @@ pub trait StepModel {
         x[2 * n..].fill(0.0);
     }
 
+    /// [`StepModel::start`] at a time in s since the start of the episode, which only some models depend on.
+    ///
+    /// # Panics
+    /// May panic if a slice has another length.
+    fn start_at(&self, _time: f64, q: &[f64], v: &[f64], x: &mut [f64]) {
+        self.start(q, v, x);
+    }
+
     /// One step in place, under torques `tau` (n; N m or N) held over it. `&mut self` is for scratch and nothing else:
     /// the same x and tau give the same result.
     ///
@@ -69,6 +77,9 @@ impl<M: StepModel + ?Sized> StepModel for Box<M> {
     }
     fn start(&self, q: &[f64], v: &[f64], x: &mut [f64]) {
         (**self).start(q, v, x);
+    }
+    fn start_at(&self, time: f64, q: &[f64], v: &[f64], x: &mut [f64]) {
+        (**self).start_at(time, q, v, x);
     }
     fn step(&mut self, x: &mut [f64], tau: &[f64]) {
         (**self).step(x, tau);

@@ -114,6 +114,12 @@ pub struct Rollout {
     /// Corrected model that `diagnose` wrote
     #[arg(long, value_name = "FILE")]
     pub with: Option<PathBuf>,
+    /// Residual network that `train residual` wrote, on the robot's own model: its folder, or weights in it
+    #[arg(long, value_name = "DIR|FILE")]
+    pub residual: Option<PathBuf>,
+    /// Network alone that `train pure` wrote: its folder, or weights in it
+    #[arg(long, value_name = "DIR|FILE")]
+    pub pure: Option<PathBuf>,
     /// Longest horizon, s
     #[arg(long, default_value_t = 1.0)]
     pub horizon: f64,

@@ -7,6 +7,7 @@ mod diagnose;
 mod evaluate;
 mod generate;
 mod input;
+mod learned;
 mod output;
 mod picture;
 mod report;

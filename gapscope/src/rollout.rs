@@ -1,12 +1,14 @@
 //! `gapscope rollout`: how the models' errors grow over the horizon, beside what one-step errors allow.
 
-use crate::cli::Rollout;
+use crate::cli::{Kind, Rollout};
 use crate::input::load;
+use crate::learned;
 use crate::output;
 use crate::report::terminal::{fill, pad};
-use crate::report::{figure, plain, rollout_page};
+use crate::report::{figure, plain, rollout_page, significant};
 use anyhow::{Context, Result, bail, ensure};
-use gapscope_diagnosis::{BoundGrowth, Corrected, ModelRollouts, RolloutOptions, Rollouts, rollouts};
+use gapscope_diagnosis::{BoundGrowth, Contender, Corrected, ModelRollouts, RolloutOptions, rollouts};
+use gapscope_dynamics::Model;
 use indicatif::ProgressBar;
 use std::fmt::Write;
 use std::time::Duration;
@@ -39,84 +41,94 @@ pub fn run(args: &Rollout) -> Result<String> {
         None => output::new_folder(first.parent().unwrap_or(std::path::Path::new("")), "rollout")?.join("rollout.html"),
     };
     let loaded = load(&args.input)?;
-    let corrected = match &args.with {
-        Some(file) => {
-            let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-            Some(Corrected::from_json(&text, &loaded.model).with_context(|| file.display().to_string())?)
-        }
-        None => None,
-    };
+    let contenders = contenders(args, &loaded.model)?;
     let options =
         RolloutOptions { horizon: args.horizon, tolerance: args.tolerance, fit: args.fit_start, starts: args.starts };
     let progress = ProgressBar::new_spinner().with_message("rolling out");
     progress.enable_steady_tick(Duration::from_millis(120));
-    let found = rollouts(&loaded.model, &loaded.episodes, corrected.as_ref(), &options)?;
+    let found = rollouts(&loaded.model, &loaded.episodes, &contenders, &options)?;
     progress.finish_and_clear();
     let joints: Vec<String> = loaded.model.joints().iter().map(|j| j.name.clone()).collect();
     output::write(&page, &rollout_page(&found, loaded.model.name(), &joints, &options))?;
     Ok(format!("{}Picture  {}", summary(loaded.model.name(), &found, &options), page.display()))
 }
 
+/// The models to roll out: as described, corrected, with a residual, and without physics, as far as they are given.
+fn contenders(args: &Rollout, robot: &Model) -> Result<Vec<Contender>> {
+    let mut models = vec![Contender::plant("nominal", robot, &[])?];
+    if let Some(file) = &args.with {
+        let name = || file.display().to_string();
+        let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", name()))?;
+        let corrected = Corrected::from_json(&text, robot).with_context(name)?;
+        models.push(Contender::plant("corrected", robot, &corrected.effects).with_context(name)?);
+    }
+    for (path, kind) in [(&args.residual, Kind::Residual), (&args.pure, Kind::Pure)] {
+        if let Some(path) = path {
+            models.push(learned::load(path, kind, robot)?);
+        }
+    }
+    Ok(models)
+}
+
 /// The tables of the terminal.
-fn summary(robot: &str, found: &Rollouts, options: &RolloutOptions) -> String {
-    let models: Vec<(&str, &ModelRollouts)> = std::iter::once(("nominal", &found.nominal))
-        .chain(found.corrected.as_ref().map(|c| ("corrected", c)))
-        .collect();
+fn summary(robot: &str, models: &[ModelRollouts], options: &RolloutOptions) -> String {
+    let Some(nominal) = models.first() else { return String::new() };
     let mut text = format!(
-        "{robot} · {} rollouts, error of all joints' positions together, rad or m\n\n",
-        found.nominal.growth.starts
+        "{robot} · {} rollouts, error of all joints' positions together, rad or m: median, and how many times less than nominal\n\n",
+        nominal.growth.starts
     );
-    let _ = write!(text, "{}", pad("horizon, s", 12));
-    for (name, _) in &models {
-        let _ = write!(text, "{}{}{}", fill(&format!("{name} median"), 18), fill("10 %", 12), fill("90 %", 12));
+    let _ = write!(text, "{}{}", pad("horizon, s", 12), fill(nominal.name, 14));
+    for model in &models[1..] {
+        let _ = write!(text, "{}", fill(model.name, 24));
     }
     text.push('\n');
-    for horizon in found.nominal.growth.horizons.iter().step_by(3) {
-        let _ = write!(text, "{}", pad(&plain(*horizon), 12));
-        for (_, model) in &models {
-            match model.growth.horizons.iter().position(|other| other == horizon) {
-                Some(at) => {
-                    let q = model.growth.overall[at];
-                    let _ = write!(
-                        text,
-                        "{}{}{}",
-                        fill(&figure(q.median), 18),
-                        fill(&figure(q.low), 12),
-                        fill(&figure(q.high), 12)
-                    );
-                }
-                None => text.push_str(&fill("–", 42)),
-            }
+    for horizon in shown(nominal.growth.horizons.len()).map(|i| nominal.growth.horizons[i]) {
+        let median = |model: &ModelRollouts| {
+            let at = model.growth.horizons.iter().position(|other| *other == horizon)?;
+            Some(model.growth.overall[at].median)
+        };
+        let cell = |value: Option<f64>| value.map_or("–".into(), figure);
+        let _ = write!(text, "{}{}", pad(&plain(horizon), 12), fill(&cell(median(nominal)), 14));
+        for model in &models[1..] {
+            let times = median(nominal).zip(median(model)).map(|(nominal, own)| nominal / own);
+            let times = times.map_or(String::new(), |times| format!("÷ {}", significant(times, 2)));
+            let _ = write!(text, "{}{}", fill(&cell(median(model)), 14), fill(&times, 10));
         }
         text.push('\n');
     }
     text.push('\n');
-    for (name, model) in &models {
+    for model in models {
         let leaves = |t: f64| {
-            if t.is_finite() { format!("{} s", plain(t)) } else { format!("not within {} s", plain(options.horizon)) }
+            if t.is_finite() { format!("after {} s", plain(t)) } else { format!("not within {} s", plain(options.horizon)) }
         };
         let rate = model.growth.rate.map_or("–".into(), figure);
         let quantiles = model.growth.leaves;
         let _ = writeln!(
             text,
-            "{} leaves {} rad after {} (10 %: {}); grows by {rate} e-folds a second",
-            pad(name, 10),
+            "{} leaves {} rad {} (10 %: {}); grows by {rate} e-folds a second",
+            pad(model.name, 10),
             plain(options.tolerance),
             leaves(quantiles.median),
             leaves(quantiles.low),
         );
     }
-    for (name, model) in &models {
+    for model in models {
         text.push('\n');
         match &model.bound {
-            Some(bound) => bounds(&mut text, name, bound),
+            Some(bound) => bounds(&mut text, model.name, bound),
             None => {
+                let name = model.name;
                 let _ = writeln!(text, "{name}: no bound (hidden state, or rollouts that leave the finite numbers)");
             }
         }
     }
     text.push('\n');
     text
+}
+
+/// Every third of the horizons, counted from the longest.
+fn shown(count: usize) -> impl Iterator<Item = usize> {
+    (0..count).filter(move |i| i % 3 == (count - 1) % 3 || *i == 0)
 }
 
 fn bounds(text: &mut String, name: &str, bound: &BoundGrowth) {
@@ -143,8 +155,9 @@ fn bounds(text: &mut String, name: &str, bound: &BoundGrowth) {
         fill("δ(L^k−1)/(L−1)", 18),
         fill("times off", 14)
     );
-    for i in (0..bound.horizons.len()).filter(|i| i % 3 == 0 || i + 1 == bound.horizons.len()) {
+    for i in shown(bound.horizons.len()) {
         let (truth, tight, loose) = (bound.truth[i], bound.tight[i], bound.loose[i]);
+        let large = |value: f64| if value.is_finite() { figure(value) } else { "over 10³⁰⁸".into() };
         let _ = writeln!(
             text,
             "  {}{}{}{}{}{}",
@@ -152,8 +165,8 @@ fn bounds(text: &mut String, name: &str, bound: &BoundGrowth) {
             fill(&figure(truth), 16),
             fill(&figure(tight), 16),
             fill(&figure(tight / truth), 12),
-            fill(&figure(loose), 18),
-            fill(&figure(loose / truth), 14)
+            fill(&large(loose), 18),
+            fill(&large(loose / truth), 14)
         );
     }
 }
@@ -186,6 +199,8 @@ mod tests {
                 skip_bad_logs: false,
             },
             with: None,
+            residual: None,
+            pure: None,
             horizon: 0.5,
             tolerance: 0.05,
             fit_start: None,

@@ -25,6 +25,27 @@ pub trait Regressor {
             self.predict(x, y);
         }
     }
+    /// ∂f/∂x at x, `[outputs][inputs]`: central differences unless a map has exact derivatives. Allocates.
+    ///
+    /// # Panics
+    /// May panic if a slice has another length.
+    fn jacobian(&mut self, x: &[f64], by_x: &mut [f64]) {
+        let (inputs, outputs) = (self.inputs(), self.outputs());
+        let mut at = x.to_vec();
+        let [mut low, mut high] = std::array::from_fn(|_| vec![0.0; outputs]);
+        for i in 0..inputs {
+            // Truncation and rounding are even at the cube root of the machine's precision.
+            let h = 6e-6 * x[i].abs().max(1.0);
+            at[i] = x[i] - h;
+            self.predict(&at, &mut low);
+            at[i] = x[i] + h;
+            self.predict(&at, &mut high);
+            at[i] = x[i];
+            for k in 0..outputs {
+                by_x[k * inputs + i] = (high[k] - low[k]) / (2.0 * h);
+            }
+        }
+    }
 }
 
 /// A network with the scratch of one thread, fed and read in `f64`. A prediction does not allocate.
@@ -79,5 +100,18 @@ impl<T: Real> Regressor for Net<T> {
             *y = own.to_f64();
         }
         self.x.truncate(self.network.inputs());
+    }
+    /// Exact, by backpropagation of one row an output.
+    fn jacobian(&mut self, x: &[f64], by_x: &mut [f64]) {
+        let (inputs, outputs) = (self.network.inputs(), self.network.outputs());
+        assert_eq!((x.len(), by_x.len()), (inputs, outputs * inputs), "lengths of x and of the derivatives");
+        let rows: Vec<T> = (0..outputs).flat_map(|_| x).map(|x| T::from_f64(*x)).collect();
+        let mut unit = vec![T::ZERO; outputs * outputs];
+        unit.iter_mut().step_by(outputs + 1).for_each(|one| *one = T::ONE);
+        let mut unused = vec![T::ZERO; self.network.parameters().len()];
+        let mut gradient = vec![T::ZERO; by_x.len()];
+        self.network.forward_batch(&mut self.pass, &rows, outputs);
+        self.network.backward(&mut self.pass, &rows, outputs, &unit, &mut unused, Some(&mut gradient));
+        by_x.iter_mut().zip(&gradient).for_each(|(by_x, gradient)| *by_x = gradient.to_f64());
     }
 }

@@ -7,6 +7,7 @@
 
 use gapscope_dynamics::{StepModel, Transitions};
 use gapscope_network::{Epoch, Examples, Learner, Real, Regressor, ShapeError, TrainError, Trained};
+use nalgebra::DMatrix;
 
 /// Rows (q, v, τ), `[rows][3n]`, and x⁺ − x, `[rows][2n]`.
 pub fn examples(seen: &Transitions) -> Examples {
@@ -67,6 +68,18 @@ impl<R: Regressor> StepModel for Pure<R> {
         self.change.predict(&self.input, &mut self.output);
         x.iter_mut().zip(&self.output).for_each(|(x, change)| *x += change);
     }
+    /// Exact where the map's is. Allocates.
+    fn jacobian(&mut self, x: &[f64], tau: &[f64], by_state: &mut DMatrix<f64>, by_torque: &mut DMatrix<f64>) {
+        let n = self.joints;
+        self.input[..2 * n].copy_from_slice(x);
+        self.input[2 * n..].copy_from_slice(tau);
+        let mut slopes = vec![0.0; 2 * n * 3 * n];
+        self.change.jacobian(&self.input, &mut slopes);
+        let slopes = DMatrix::from_row_slice(2 * n, 3 * n, &slopes);
+        by_state.copy_from(&slopes.columns(0, 2 * n));
+        (0..2 * n).for_each(|i| by_state[(i, i)] += 1.0);
+        by_torque.copy_from(&slopes.columns(2 * n, n));
+    }
     /// All states through the map in one batch. Allocates.
     fn step_batch(&mut self, x: &mut [f64], tau: &[f64]) {
         let n = self.joints;
@@ -104,6 +117,17 @@ mod tests {
         let rms = |k: usize| (errors.chunks(2).map(|e| e[k] * e[k]).sum::<f64>() / 2000.0).sqrt();
         // One step changes the velocity by some 0.15 rad/s.
         assert!(rms(0) < 1e-3 && rms(1) < 1e-2, "{} {}", rms(0), rms(1));
+    }
+
+    #[test]
+    fn derivatives_agree_with_differences() {
+        let network = Mlp::<f64>::new(&[6, 16, 16, 4], Activation::Tanh, gapscope_network::Init::Xavier, 1).unwrap();
+        let mut model = Pure::new(2, 0.01, Net::new(network)).unwrap();
+        let (x, tau) = ([0.3, -0.5, 0.8, 0.1], [0.4, -0.9]);
+        let [mut exact, mut numeric] = [(); 2].map(|()| (DMatrix::zeros(4, 4), DMatrix::zeros(4, 2)));
+        model.jacobian(&x, &tau, &mut exact.0, &mut exact.1);
+        gapscope_dynamics::central_differences(&mut model, &x, &tau, &mut numeric.0, &mut numeric.1);
+        assert!((exact.0 - numeric.0).amax() < 1e-8 && (exact.1 - numeric.1).amax() < 1e-8);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! f_hyb in continuous time: ẋ = f_phys(x, τ) + r_θ(x, τ), integrated.
 
 use crate::error::ResidualError;
-use gapscope_dynamics::{Data, Model, StepModel};
+use gapscope_dynamics::{Data, DormandPrince, Model, StepModel};
 use gapscope_network::{Regressor, ShapeError};
 
 /// How a step of [`Continuous`] is integrated, torque held over it.
@@ -9,10 +9,9 @@ use gapscope_network::{Regressor, ShapeError};
 pub enum Scheme {
     /// The classical Runge-Kutta scheme of order four, one step of dt.
     Rk4,
-    /// Dormand and Prince's pair of orders five and four with steps of its own choice (J. Comp. Appl. Math. 6, 1980): the
-    /// estimated error of each is at most `tolerance` times max(1, |x_i|) in every component.
+    /// [`DormandPrince`], steps of its own choice; the state becomes NaN where it fails.
     Adaptive {
-        /// Tolerance, dimensionless.
+        /// Relative tolerance, and absolute in SI units.
         tolerance: f64,
     },
 }
@@ -24,9 +23,9 @@ pub struct Continuous<F, R> {
     rate: F,
     residual: R,
     scheme: Scheme,
-    joints: usize,
     dt: f64,
-    stages: [Vec<f64>; 7],
+    integrator: DormandPrince,
+    stages: [Vec<f64>; 4],
     at: Vec<f64>,
     input: Vec<f64>,
     correction: Vec<f64>,
@@ -44,23 +43,6 @@ pub fn rigid_rate(model: Model) -> impl FnMut(&[f64], &[f64], &mut [f64]) + Clon
     }
 }
 
-/// Least part of dt that an adaptive step may take, whatever the tolerance.
-const SHORTEST: f64 = 1e-6;
-
-/// Dormand and Prince's coefficients (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, table II.5.2).
-const A: [&[f64]; 7] = [
-    &[],
-    &[1.0 / 5.0],
-    &[3.0 / 40.0, 9.0 / 40.0],
-    &[44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0],
-    &[19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0],
-    &[9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0],
-    &[35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
-];
-/// Weights of order five less those of order four.
-const ERROR: [f64; 7] =
-    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
-
 impl<F: FnMut(&[f64], &[f64], &mut [f64]), R: Regressor> Continuous<F, R> {
     /// `rate` fills ẋ from x = (q, v), length 2n, and τ; the same arguments must give the same result.
     ///
@@ -75,78 +57,66 @@ impl<F: FnMut(&[f64], &[f64], &mut [f64]), R: Regressor> Continuous<F, R> {
         }
         let stages = std::array::from_fn(|_| vec![0.0; 2 * n]);
         let (at, input, correction) = (vec![0.0; 2 * n], vec![0.0; 3 * n], vec![0.0; outputs]);
-        Ok(Self { rate, residual, scheme, joints, dt, stages, at, input, correction })
+        let tolerance = if let Scheme::Adaptive { tolerance } = scheme { tolerance } else { 0.0 };
+        let integrator = DormandPrince::new(2 * n, tolerance, tolerance);
+        Ok(Self { rate, residual, scheme, dt, integrator, stages, at, input, correction })
     }
 
-    /// stages[stage] ← ẋ at self.at.
-    fn slope(&mut self, stage: usize, tau: &[f64]) {
-        let n = self.joints;
-        (self.rate)(&self.at, tau, &mut self.stages[stage]);
-        self.input[..2 * n].copy_from_slice(&self.at);
-        self.input[2 * n..].copy_from_slice(tau);
-        self.residual.predict(&self.input, &mut self.correction);
-        let from = 2 * n - self.correction.len();
-        self.stages[stage][from..].iter_mut().zip(&self.correction).for_each(|(s, r)| *s += r);
-    }
-
-    fn rk4(&mut self, x: &mut [f64], tau: &[f64]) {
-        self.at.copy_from_slice(x);
-        for (stage, reach) in [0.5, 0.5, 1.0, 0.0].into_iter().enumerate() {
-            self.slope(stage, tau);
-            for (i, at) in self.at.iter_mut().enumerate() {
-                *at = x[i] + reach * self.dt * self.stages[stage][i];
+    fn step_rk4(&mut self, x: &mut [f64], tau: &[f64]) {
+        let Self { rate, residual, stages, at, input, correction, dt, .. } = self;
+        at.copy_from_slice(x);
+        for (slope, reach) in stages.iter_mut().zip([0.5, 0.5, 1.0, 0.0]) {
+            corrected(rate, residual, input, correction, at, tau, slope);
+            for (i, at) in at.iter_mut().enumerate() {
+                *at = x[i] + reach * *dt * slope[i];
             }
         }
-        let [a, b, c, d, ..] = &self.stages;
+        let [a, b, c, d] = stages;
         for (i, x) in x.iter_mut().enumerate() {
-            *x += self.dt / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]);
+            *x += *dt / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]);
         }
     }
 
-    fn adaptive(&mut self, x: &mut [f64], tau: &[f64], tolerance: f64) {
-        let mut left = self.dt;
-        let mut h = self.dt;
-        while left > 1e-12 * self.dt {
-            h = h.min(left);
-            for stage in 0..7 {
-                for i in 0..x.len() {
-                    let sum: f64 = A[stage].iter().zip(&self.stages).map(|(a, k)| a * k[i]).sum();
-                    self.at[i] = x[i] + h * sum;
-                }
-                self.slope(stage, tau);
-            }
-            // The last stage stands at the solution of order five.
-            let error = (0..x.len())
-                .map(|i| {
-                    let own: f64 = ERROR.iter().zip(&self.stages).map(|(e, k)| e * k[i]).sum();
-                    h * own.abs() / x[i].abs().max(1.0)
-                })
-                .fold(0.0, f64::max)
-                / tolerance;
-            let finite = self.at.iter().all(|x| x.is_finite());
-            if error <= 1.0 || !finite || h <= SHORTEST * self.dt {
-                x.copy_from_slice(&self.at);
-                left -= h;
-            }
-            if !finite {
-                return;
-            }
-            h = (h * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0)).max(SHORTEST * self.dt);
+    fn step_adaptive(&mut self, x: &mut [f64], tau: &[f64]) {
+        let Self { rate, residual, integrator, input, correction, dt, .. } = self;
+        // What the last call learnt would make the result depend on it.
+        integrator.forget();
+        let slope = |_: f64, x: &[f64], slope: &mut [f64]| corrected(rate, residual, input, correction, x, tau, slope);
+        if integrator.integrate(slope, [0.0, *dt], x, |_| {}).is_err() {
+            x.fill(f64::NAN);
         }
     }
 }
 
+/// slope ← ẋ with the correction at x; `input` and `correction` are scratch.
+fn corrected(
+    rate: &mut impl FnMut(&[f64], &[f64], &mut [f64]),
+    residual: &mut impl Regressor,
+    input: &mut [f64],
+    correction: &mut [f64],
+    x: &[f64],
+    tau: &[f64],
+    slope: &mut [f64],
+) {
+    rate(x, tau, slope);
+    input[..x.len()].copy_from_slice(x);
+    input[x.len()..].copy_from_slice(tau);
+    residual.predict(input, correction);
+    let from = x.len() - correction.len();
+    slope[from..].iter_mut().zip(correction).for_each(|(slope, r)| *slope += *r);
+}
+
 impl<F: FnMut(&[f64], &[f64], &mut [f64]), R: Regressor> StepModel for Continuous<F, R> {
     fn joints(&self) -> usize {
-        self.joints
+        self.at.len() / 2
     }
     fn dt(&self) -> f64 {
         self.dt
     }
     fn step(&mut self, x: &mut [f64], tau: &[f64]) {
         match self.scheme {
-            Scheme::Rk4 => self.rk4(x, tau),
-            Scheme::Adaptive { tolerance } => self.adaptive(x, tau, tolerance),
+            Scheme::Rk4 => self.step_rk4(x, tau),
+            Scheme::Adaptive { .. } => self.step_adaptive(x, tau),
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::error::ResidualError;
 use gapscope_dynamics::StepModel;
 use gapscope_network::{Regressor, ShapeError};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// What the correction r_θ(x, τ) corrects.
@@ -80,6 +81,9 @@ impl<P: StepModel, R: Regressor> StepModel for Hybrid<P, R> {
     fn start(&self, q: &[f64], v: &[f64], x: &mut [f64]) {
         self.physics.start(q, v, x);
     }
+    fn start_at(&self, time: f64, q: &[f64], v: &[f64], x: &mut [f64]) {
+        self.physics.start_at(time, q, v, x);
+    }
     fn step(&mut self, x: &mut [f64], tau: &[f64]) {
         let n = self.tau.len();
         self.input[..2 * n].copy_from_slice(&x[..2 * n]);
@@ -104,6 +108,40 @@ impl<P: StepModel, R: Regressor> StepModel for Hybrid<P, R> {
                     self.tau[j] = tau[j] + r[j];
                 }
                 self.physics.step(x, &self.tau);
+            }
+        }
+    }
+    /// Those of the physics with the correction's by the chain rule: exact where both are. Allocates.
+    fn jacobian(&mut self, x: &[f64], tau: &[f64], by_state: &mut DMatrix<f64>, by_torque: &mut DMatrix<f64>) {
+        let (n, out) = (self.tau.len(), self.correction.len());
+        self.input[..2 * n].copy_from_slice(&x[..2 * n]);
+        self.input[2 * n..].copy_from_slice(tau);
+        let mut slopes = vec![0.0; out * 3 * n];
+        self.residual.jacobian(&self.input, &mut slopes);
+        let slopes = DMatrix::from_row_slice(out, 3 * n, &slopes);
+        if self.on == On::Torque {
+            self.residual.predict(&self.input, &mut self.correction);
+            self.tau.iter_mut().zip(tau.iter().zip(&self.correction)).for_each(|(sum, (tau, r))| *sum = tau + r);
+            self.physics.jacobian(x, &self.tau, by_state, by_torque);
+            let through = &*by_torque * slopes;
+            let mut measured = by_state.columns_mut(0, 2 * n);
+            measured += through.columns(0, 2 * n);
+            *by_torque += through.columns(2 * n, n);
+            return;
+        }
+        self.physics.jacobian(x, tau, by_state, by_torque);
+        let mut add = |rows: usize, scale: f64| {
+            let mut measured = by_state.view_mut((rows, 0), (out, 2 * n));
+            measured += scale * slopes.columns(0, 2 * n);
+            let mut torques = by_torque.rows_mut(rows, out);
+            torques += scale * slopes.columns(2 * n, n);
+        };
+        let dt = self.physics.dt();
+        match self.on {
+            On::NextState => add(0, 1.0),
+            On::Acceleration | On::Torque => {
+                add(0, dt * dt);
+                add(n, dt);
             }
         }
     }

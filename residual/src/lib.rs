@@ -10,7 +10,6 @@
 //! shrunk. (Expand the square and set the derivative for each (x, τ) to zero.)
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod batch;
 mod continuous;
 mod error;
 mod explained;
@@ -20,7 +19,6 @@ mod orthogonal;
 mod ridge;
 mod step_fn;
 
-pub use batch::HybridBatch;
 pub use continuous::{Continuous, Scheme, rigid_rate};
 pub use error::ResidualError;
 pub use explained::{Alarm, Explained, explained_share};

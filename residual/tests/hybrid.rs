@@ -1,13 +1,13 @@
 //! f_hyb over the rigid model, a plant with effects and a user's closure; discrete and continuous; one state and many.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use gapscope_dynamics::{Data, Discrete, Integrator, Model, StepModel, Transitions, robots};
+use gapscope_dynamics::{Data, Discrete, Integrator, Model, StepModel, Transitions, central_differences, robots};
 use gapscope_effects::{Effect, Plant, ViscousFriction};
 use gapscope_network::{Activation, Init, Learner, Mlp, Net, Regressor, ShapeError, TrainSettings};
 use gapscope_residual::{
-    Continuous, Hybrid, HybridBatch, On, Orthogonal, ResidualError, Scheme, StepFn, Tangents, examples, learn,
-    rigid_rate,
+    Continuous, Hybrid, On, Orthogonal, ResidualError, Scheme, StepFn, Tangents, examples, learn, rigid_rate,
 };
+use nalgebra::DMatrix;
 
 const DT: f64 = 0.01;
 
@@ -210,19 +210,48 @@ fn in_continuous_time_the_correction_is_integrated_with_the_physics() {
 #[test]
 fn many_states_at_once_are_one_state_at_a_time() {
     let model = arm("arm7");
-    let mut network = Mlp::<f64>::new(&[21, 40, 14], Activation::Tanh, Init::Xavier, 1).unwrap();
-    network.parameters_mut().iter_mut().for_each(|p| *p *= 0.01);
-    let mut batch = HybridBatch::new(model.clone(), DT, network.clone()).unwrap();
-    let physics = Discrete::new(model.clone(), DT, Integrator::SemiImplicitEuler);
-    let mut single = Hybrid::new(physics, Net::new(network.clone()), On::NextState).unwrap();
-    for rows in [1, 8, 67, 130] {
-        let (mut x, tau) = (numbers(rows * 14, 0.1), numbers(rows * 7, 0.4));
-        let mut y = x.clone();
-        batch.step(&mut x, &tau);
-        y.chunks_mut(14).zip(tau.chunks(7)).for_each(|(y, tau)| single.step(y, tau));
-        assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-10 * y.abs().max(1.0)));
+    for (on, physics) in kinds(&model) {
+        let network = small(&[21, 40, on.outputs(7)]);
+        let mut hybrid = Hybrid::new(physics, Net::new(network), on).unwrap();
+        for rows in [1, 8, 67, 130] {
+            let (mut x, tau) = (numbers(rows * 14, 0.1), numbers(rows * 7, 0.4));
+            let mut y = x.clone();
+            hybrid.step_batch(&mut x, &tau);
+            y.chunks_mut(14).zip(tau.chunks(7)).for_each(|(y, tau)| hybrid.step(y, tau));
+            assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-10 * y.abs().max(1.0)), "{on:?}");
+        }
     }
-    assert!(HybridBatch::new(arm("arm6"), DT, network).is_err());
+}
+
+fn kinds(model: &Model) -> Vec<(On, Discrete)> {
+    let physics = || Discrete::new(model.clone(), DT, Integrator::SemiImplicitEuler);
+    [On::NextState, On::Acceleration, On::Torque].into_iter().map(|on| (on, physics())).collect()
+}
+
+/// A network whose outputs are small.
+fn small(sizes: &[usize]) -> Mlp<f64> {
+    let mut network = Mlp::new(sizes, Activation::Tanh, Init::Xavier, 1).unwrap();
+    network.parameters_mut().iter_mut().for_each(|p| *p *= 0.1);
+    network
+}
+
+#[test]
+fn derivatives_agree_with_differences() {
+    let model = arm("arm6");
+    let (x, tau) = (numbers(12, 0.2), numbers(6, 0.5));
+    for (on, physics) in kinds(&model) {
+        let mut hybrid = Hybrid::new(physics, Net::new(small(&[18, 20, on.outputs(6)])), on).unwrap();
+        let zeros = || (DMatrix::zeros(12, 12), DMatrix::zeros(12, 6));
+        let ((mut exact, mut numeric), mut plain) = ((zeros(), zeros()), zeros());
+        hybrid.jacobian(&x, &tau, &mut exact.0, &mut exact.1);
+        central_differences(&mut hybrid, &x, &tau, &mut numeric.0, &mut numeric.1);
+        for (exact, numeric) in [(&exact.0, &numeric.0), (&exact.1, &numeric.1)] {
+            let worst = (exact - numeric).amax() / numeric.amax();
+            assert!(worst < 1e-6, "{on:?}: {worst:e}");
+        }
+        kinds(&model)[0].1.jacobian(&x, &tau, &mut plain.0, &mut plain.1);
+        assert!((exact.0 - plain.0).amax() > 1e-6, "the correction has a part in it");
+    }
 }
 
 #[test]

@@ -30,10 +30,10 @@ impl<M: StepModel + Send> Batch<M> {
         Batch { workers: (0..rayon::current_num_threads().max(1)).map(worker).collect() }
     }
 
-    /// [`StepModel::start`].
-    pub fn start(&self, q: &[f64], v: &[f64], x: &mut [f64]) {
+    /// [`StepModel::start_at`].
+    pub fn start_at(&self, time: f64, q: &[f64], v: &[f64], x: &mut [f64]) {
         if let Some(worker) = self.workers.first() {
-            worker.model.start(q, v, x);
+            worker.model.start_at(time, q, v, x);
         }
     }
 

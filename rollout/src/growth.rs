@@ -1,5 +1,7 @@
 //! Errors of many rollouts over the horizon: quantiles over starts, growth rate, when they leave a tolerance.
 
+use crate::horizon::Errors;
+
 /// Quantiles of a sample; all NaN for an empty one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantiles {
@@ -27,7 +29,7 @@ impl Quantiles {
     }
 }
 
-/// How the error of a model's rollouts grows, from [`crate::horizon_states`] against a measured trajectory.
+/// How the error of a model's rollouts grows, from [`crate::horizon_errors`] against a trajectory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Growth {
     /// Horizons that at least one rollout reached, s.
@@ -50,7 +52,7 @@ pub struct Growth {
 impl Growth {
     /// From the errors (2n: positions, velocities) of rollouts at each horizon, in s; `tolerance` in rad or m.
     /// A rollout that is not finite or beyond its log at a horizon has none there.
-    pub fn new(errors: &[Vec<Option<Vec<f64>>>], horizons: &[f64], tolerance: f64) -> Growth {
+    pub fn new(errors: &[Errors], horizons: &[f64], tolerance: f64) -> Growth {
         let joints = errors.iter().flatten().flatten().next().map_or(0, |e| e.len() / 2);
         let size = |error: &[f64]| error[..joints].iter().map(|e| e * e).sum::<f64>().sqrt();
         let leaves = errors.iter().map(|rollout| {

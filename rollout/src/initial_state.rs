@@ -1,6 +1,6 @@
 //! The initial state of a rollout, fitted: where a log is noisy, a wrong start would count as the model's error.
 
-use crate::horizon::{Initial, Start, Trajectory};
+use crate::horizon::{Initial, Trajectory};
 use gapscope_dynamics::StepModel;
 use nalgebra::{DMatrix, DVector};
 
@@ -9,17 +9,16 @@ const ROUNDS: usize = 8;
 const SETTLED: f64 = 1e-10;
 
 /// The position and velocity from which the model's rollout over the next `window` samples fits the measured positions
-/// best (least squares, Gauss–Newton with the model's Jacobians); the measured start where no fit is found or the log
-/// ends before the window. Hidden state starts at rest. Allocates.
+/// best (least squares, Gauss–Newton with the model's Jacobians); `start` where no fit is found or the log ends before the
+/// window. Hidden state starts at rest. Allocates.
 pub fn fit_initial_state(
     model: &mut impl StepModel,
     trajectory: Trajectory<'_>,
-    start: &Start,
+    start: &Initial,
     window: usize,
 ) -> Initial {
-    let measured = Initial::measured(trajectory, start);
-    let length = trajectory.position.first().map_or(0, Vec::len);
-    if window < 2 || start.sample + window >= length {
+    let measured = start.clone();
+    if window < 2 || start.sample + window >= trajectory.len() {
         return measured;
     }
     let mut best = measured.clone();
@@ -58,14 +57,14 @@ impl Fit {
     fn at(model: &mut impl StepModel, trajectory: Trajectory<'_>, start: &Initial, window: usize) -> Option<Fit> {
         let (n, len) = (model.joints(), model.state_len());
         let mut x = vec![0.0; len];
-        model.start(&start.position, &start.velocity, &mut x);
+        let begin = trajectory.start(model, start, &mut x);
+        let each = trajectory.efforts_in_step(model);
         let mut sensitivity = DMatrix::identity(len, 2 * n);
         let (mut by_state, mut by_torque) = (DMatrix::zeros(len, len), DMatrix::zeros(len, n));
         let mut fit = Fit { cost: 0.0, normal: DMatrix::zeros(2 * n, 2 * n), gradient: DVector::zeros(2 * n) };
         let mut tau = vec![0.0; n];
-        let begin = trajectory.first + start.sample * trajectory.stride;
-        for k in 0..=window * trajectory.stride {
-            if k % trajectory.stride == 0 {
+        for k in (0..=window * trajectory.stride).step_by(each) {
+            if k.is_multiple_of(trajectory.stride) {
                 let sample = start.sample + k / trajectory.stride;
                 for j in 0..n {
                     let error = trajectory.position[j][sample] - x[j];
@@ -75,12 +74,10 @@ impl Fit {
                     fit.gradient += error * row.transpose();
                 }
             }
-            if k == window * trajectory.stride {
+            if k + each > window * trajectory.stride {
                 break;
             }
-            for (tau, effort) in tau.iter_mut().zip(trajectory.effort) {
-                *tau = *effort.get(begin + k)?;
-            }
+            trajectory.mean_effort(begin + k, each, &mut tau)?;
             model.jacobian(&x, &tau, &mut by_state, &mut by_torque);
             sensitivity = &by_state * sensitivity;
             model.step(&mut x, &tau);

@@ -19,7 +19,7 @@ mod norm;
 pub use batch::{BLOCK, Batch};
 pub use bound::{Bounds, bounds, geometric};
 pub use growth::{Growth, Quantiles, growth_rate};
-pub use horizon::{Errors, Initial, Start, Trajectory, horizon_errors, horizon_states};
+pub use horizon::{Errors, Initial, Trajectory, horizon_errors, simulate};
 pub use initial_state::fit_initial_state;
 pub use lipschitz::{Region, lipschitz_constant};
 pub use norm::Norm;

@@ -58,21 +58,6 @@ impl Plant {
         Layout { joints, clock, history, lagged, bristles, wind_up }
     }
 
-    /// Like [`gapscope_dynamics::StepModel::start`], at a time in s since the start of the episode, which friction that
-    /// drifts and contacts depend on.
-    ///
-    /// # Panics
-    /// If a slice has another length.
-    pub fn start_at(&self, time: f64, q: &[f64], v: &[f64], x: &mut [f64]) {
-        x.fill(0.0);
-        let state = self.layout().split(x);
-        state.q.copy_from_slice(q);
-        state.v.copy_from_slice(v);
-        if let Some(clock) = state.clock.first_mut() {
-            *clock = time;
-        }
-    }
-
     /// Positions that the drives' own encoders show in a state, rad or m, written to `q` (n): on joints with a spring or
     /// play and a rotor those of the motors, on all others those of the links. A servo closes its loop over them, whatever the
     /// log shows. Before the first step motors count as turned with their links. Allocates nothing.

@@ -270,6 +270,17 @@ impl StepModel for Plant {
         self.start_at(0.0, q, v, x);
     }
 
+    /// Friction that drifts and contacts depend on the time.
+    fn start_at(&self, time: f64, q: &[f64], v: &[f64], x: &mut [f64]) {
+        x.fill(0.0);
+        let state = self.layout().split(x);
+        state.q.copy_from_slice(q);
+        state.v.copy_from_slice(v);
+        if let Some(clock) = state.clock.first_mut() {
+            *clock = time;
+        }
+    }
+
     fn step(&mut self, x: &mut [f64], tau: &[f64]) {
         self.scratch.outside.fill(0.0);
         self.advance(x, tau);

@@ -47,7 +47,7 @@ impl Axis {
             .filter(|p| p % every.max(1) == 0)
             .flat_map(|p| mantissas.iter().map(move |m| m * 10f64.powi(p)))
             .filter(|v| (from..=to).contains(v))
-            .map(|v| (v, format::plain(v)))
+            .map(|v| (v, format::plain(v).trim_start_matches("1 × ").to_owned()))
             .collect();
         Axis { from, to, logarithmic: true, ticks, title: title.into() }
     }

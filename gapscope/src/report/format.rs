@@ -50,11 +50,8 @@ pub fn figure(value: f64) -> String {
 /// Three significant digits without trailing zeros, for durations, rates and bounds.
 pub fn plain(value: f64) -> String {
     let text = figure(value);
-    if text.contains('.') && !text.contains('×') {
-        text.trim_end_matches('0').trim_end_matches('.').to_string()
-    } else {
-        text
-    }
+    let (mantissa, power) = text.split_at(text.find(" ×").unwrap_or(text.len()));
+    if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.').to_string() + power } else { text }
 }
 
 /// `value` with a fixed number of decimals and a true minus sign.
@@ -316,6 +313,7 @@ mod tests {
         }
         assert_eq!(plain(40.0), "40");
         assert_eq!(plain(500.0), "500");
+        assert_eq!(plain(1e-6), "1 × 10⁻⁶");
         assert_eq!(fixed(-0.001, 2), "0.00");
     }
 

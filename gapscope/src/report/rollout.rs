@@ -4,15 +4,20 @@ use super::STYLE;
 use super::axis::Axis;
 use super::chart::{Plot, band, line};
 use super::format::{figure, plain};
-use gapscope_diagnosis::{BoundGrowth, ModelRollouts, RolloutOptions, Rollouts};
+use gapscope_diagnosis::{BoundGrowth, ModelRollouts, RolloutOptions};
+use gapscope_rollout::{Growth, Quantiles};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Line styles that only this page needs.
-const EXTRA: &str = ".line.tight { stroke: var(--other); } .line.loose { stroke: var(--floor); stroke-dasharray: 5 4; } \
-    .band.before { fill: var(--before); opacity: .18; } .swatch.tight { background: var(--other); } .swatch.loose { background: var(--floor); }";
+const EXTRA: &str = ".line.hybrid { stroke: var(--other); } .line.pure { stroke: var(--good); stroke-dasharray: 7 4; } \
+    .line.tight { stroke: var(--ink); } .line.loose { stroke: var(--dot); stroke-dasharray: 5 4; } \
+    .band, .band.after { opacity: .14; } .band.before { fill: var(--before); } .band.hybrid { fill: var(--other); } .band.pure { fill: var(--good); } \
+    .swatch.hybrid { background: var(--other); } .swatch.tight { background: var(--ink); height: .15rem; vertical-align: .2rem; } \
+    .swatch.pure, .swatch.loose { height: 0; border-top: .2rem dashed var(--good); vertical-align: .18rem; } .swatch.loose { border-color: var(--dot); }";
 
 /// The page as self-contained HTML.
-pub fn page(found: &Rollouts, robot: &str, joints: &[String], options: &RolloutOptions) -> String {
+pub fn page(models: &[ModelRollouts], robot: &str, joints: &[String], options: &RolloutOptions) -> String {
+    let starts = models.first().map_or(0, |m| m.growth.starts);
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -25,26 +30,25 @@ pub fn page(found: &Rollouts, robot: &str, joints: &[String], options: &RolloutO
             }
             body {
                 header {
-                    p.kicker { "Rollouts · " b { (robot) } " · " (found.nominal.growth.starts) " starts, horizon " (plain(options.horizon)) " s" }
+                    p.kicker { "Rollouts · " b { (robot) } " · " (starts) " starts, horizon " (plain(options.horizon)) " s" }
                     h1 { "Error over the horizon" }
                 }
                 main {
-                    section id="all" { h2 { "All joints" } (overall(found)) }
+                    section id="all" { h2 { "All joints" } (overall(models)) }
                     section id="bounds" {
                         h2 { "Truth and bounds" }
                         p.lead { "What one-step errors and Jacobians allow, beside what happened: medians over stretches of the logs. "
                             "The loose bound takes the largest δ and L there are. M: mass matrix at the mean position; m: its mean diagonal entry." }
                         div.grid-two {
-                            (bounds("model as described", "before", &found.nominal))
-                            @if let Some(corrected) = &found.corrected { (bounds("model with the effects", "after", corrected)) }
+                            @for model in models { (bounds(model)) }
                         }
                     }
                     section id="joints" {
                         h2 { "By joint" }
                         div.grid-two {
                             @for (j, name) in joints.iter().enumerate() {
-                                (joint(found, j, name, false))
-                                (joint(found, j, name, true))
+                                (joint(models, j, name, false))
+                                (joint(models, j, name, true))
                             }
                         }
                     }
@@ -56,16 +60,20 @@ pub fn page(found: &Rollouts, robot: &str, joints: &[String], options: &RolloutO
     page.into_string()
 }
 
-/// Each model with its class.
-fn models(found: &Rollouts) -> Vec<(&'static str, &ModelRollouts)> {
-    std::iter::once(("before", &found.nominal)).chain(found.corrected.as_ref().map(|c| ("after", c))).collect()
+/// Class and name of a model on the page.
+fn look(model: &ModelRollouts) -> (&'static str, &'static str) {
+    match model.name {
+        "nominal" => ("before", "model as described"),
+        "corrected" => ("after", "with the effects"),
+        "hybrid" => ("hybrid", "with a residual network"),
+        _ => ("pure", "network alone"),
+    }
 }
 
-fn legend(corrected: bool) -> Markup {
+fn legend(models: &[ModelRollouts]) -> Markup {
     html! {
         span.legend {
-            span.swatch.before {} " model as described"
-            @if corrected { span.swatch.after {} " with the effects" }
+            @for (class, name) in models.iter().map(look) { span class={ "swatch " (class) } {} " " (name) }
             "; median, and from the 10th to the 90th percentile of the starts"
         }
     }
@@ -90,31 +98,30 @@ fn growth(curves: &[(&'static str, Vec<[f64; 4]>)], title: &str, class: &'static
     }
 }
 
-fn overall(found: &Rollouts) -> Markup {
-    let curves: Vec<(&'static str, Vec<[f64; 4]>)> = models(found)
-        .into_iter()
-        .map(|(class, model)| {
-            let points = model.growth.horizons.iter().zip(&model.growth.overall);
-            (class, points.map(|(h, q)| [*h, q.low, q.median, q.high]).collect())
-        })
-        .collect();
+/// Curves of one quantity for every model: horizon, low, median, high.
+fn curves(models: &[ModelRollouts], of: &dyn Fn(&Growth, usize) -> Quantiles) -> Vec<(&'static str, Vec<[f64; 4]>)> {
+    let curve = |model: &ModelRollouts| {
+        let point = |(h, horizon): (usize, &f64)| {
+            let q = of(&model.growth, h);
+            [*horizon, q.low, q.median, q.high]
+        };
+        (look(model).0, model.growth.horizons.iter().enumerate().map(point).collect())
+    };
+    models.iter().map(curve).collect()
+}
+
+fn overall(models: &[ModelRollouts]) -> Markup {
+    let curves = curves(models, &|growth, h| growth.overall[h]);
     html! {
         figure {
-            figcaption { b { "Norm of the position error over the joints" } (legend(found.corrected.is_some())) }
+            figcaption { b { "Norm of the position error over the joints" } (legend(models)) }
             (growth(&curves, "position error, rad or m", "high", "Position error over the horizon".into()))
         }
     }
 }
 
-fn joint(found: &Rollouts, j: usize, name: &str, velocity: bool) -> Markup {
-    let curves: Vec<(&'static str, Vec<[f64; 4]>)> = models(found)
-        .into_iter()
-        .map(|(class, model)| {
-            let rows = if velocity { &model.growth.velocity } else { &model.growth.position };
-            let points = model.growth.horizons.iter().zip(rows);
-            (class, points.map(|(h, row)| [*h, row[j].low, row[j].median, row[j].high]).collect())
-        })
-        .collect();
+fn joint(models: &[ModelRollouts], j: usize, name: &str, velocity: bool) -> Markup {
+    let curves = curves(models, &|growth, h| if velocity { growth.velocity[h][j] } else { growth.position[h][j] });
     let (what, title) =
         if velocity { ("velocity", "velocity error, rad/s or m/s") } else { ("position", "position error, rad or m") };
     html! {
@@ -125,7 +132,8 @@ fn joint(found: &Rollouts, j: usize, name: &str, velocity: bool) -> Markup {
     }
 }
 
-fn bounds(name: &str, class: &'static str, model: &ModelRollouts) -> Markup {
+fn bounds(model: &ModelRollouts) -> Markup {
+    let (class, name) = look(model);
     let Some(bound) = &model.bound else {
         return html! { p.muted { (name) ": no bound, as the model has hidden state or its rollouts leave the finite numbers." } };
     };
@@ -133,7 +141,8 @@ fn bounds(name: &str, class: &'static str, model: &ModelRollouts) -> Markup {
         bound.horizons.iter().copied().zip(values.iter().copied()).map(|(h, v)| [h, v]).collect()
     };
     let x = Axis::powers(bound.horizons.iter().copied(), "horizon, s");
-    let all = bound.truth.iter().chain(&bound.tight).chain(&bound.loose).copied();
+    // The loose bound leaves the frame: no axis shows it and the truth.
+    let all = bound.truth.iter().chain(&bound.tight).copied().chain(bound.tight.last().map(|most| 10.0 * most));
     let y = Axis::powers(all, &format!("√(qᵀMq + ({} s)² vᵀMv)/√m, rad or m", plain(bound.time)));
     html! {
         figure {
@@ -161,11 +170,12 @@ fn sentence(bound: &BoundGrowth) -> String {
     else {
         return String::new();
     };
+    let times = |bound: f64| if bound.is_finite() { figure(bound / truth) } else { "over 10³⁰⁸".into() };
     format!(
         "At {} s the tight bound is {} times the truth, the loose one {} times. One step of {} s: δ {} (median), {} (largest); L {}.",
         plain(*horizon),
-        figure(tight / truth),
-        figure(loose / truth),
+        times(*tight),
+        times(*loose),
         plain(bound.step),
         figure(bound.delta.median),
         figure(bound.delta.most),

@@ -37,6 +37,9 @@ const SERVO: [f64; 2] = [10.0, 1.0];
 const AHEAD: usize = 20;
 const SPREAD: f64 = 6.0;
 
+/// Controllers in the order of the table.
+const CONTROLLERS: [&str; 3] = ["computed torque", "iLQR", "MPPI"];
+
 /// Cost promised and paid by one controller on one model.
 pub struct Figure {
     /// Hidden effect.
@@ -79,10 +82,14 @@ pub fn run(args: &ClosedLoop) -> Result<String> {
     let mut figures = Vec::new();
     for (name, effects) in &hidden {
         bar.set_message(format!("{name}: logs, diagnosis"));
+        let mut found = Vec::new();
         for contender in contenders(&robot, effects)? {
             bar.set_message(format!("{name}: {}", contender.name));
-            figures.extend(study(&robot, name, effects, &contender, args.samples)?);
+            found.extend(study(&robot, name, effects, &contender, args.samples)?);
         }
+        // Models one under the other for each controller.
+        found.sort_by_key(|f| CONTROLLERS.iter().position(|own| *own == f.controller));
+        figures.extend(found);
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -154,9 +161,10 @@ fn study(
         figures.push(figure);
         Ok(())
     };
-    judge("computed torque", &mut || Box::new(computed()))?;
+    let [computed_torque, ilqr, mppi] = CONTROLLERS;
+    judge(computed_torque, &mut || Box::new(computed()))?;
     let plan = Ilqr::new(model(), &task).plan(&mut ComputedTorque::new(model(), robot, &task, SERVO));
-    judge("iLQR", &mut || Box::new(plan.clone()))?;
+    judge(ilqr, &mut || Box::new(plan.clone()))?;
     let mut mass = DMatrix::zeros(robot.dof(), robot.dof());
     robot.mass_matrix(&mut Data::new(robot), &FROM, &mut mass);
     let settings = MppiSettings {
@@ -167,7 +175,7 @@ fn study(
         temperature: 0.05,
         seed: 1,
     };
-    judge("MPPI", &mut || Box::new(Mppi::new(model, &task, settings.clone())))?;
+    judge(mppi, &mut || Box::new(Mppi::new(model, &task, settings.clone())))?;
     Ok(figures)
 }
 

@@ -67,7 +67,7 @@ impl<M: StepModel> Controller for ComputedTorque<M> {
         let mut best = (f64::INFINITY, tau.to_vec());
         let mut push_harder = 1.0;
         for _ in 0..ROUNDS {
-            self.model.start(q, v, &mut self.x);
+            self.model.start_at(step as f64 * dt, q, v, &mut self.x);
             self.model.jacobian(&self.x, tau, &mut self.by_state, &mut self.by_torque);
             self.model.step(&mut self.x, tau);
             let short = DVector::from_fn(n, |j, _| self.wanted[j] - self.x[n + j]);

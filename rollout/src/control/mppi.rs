@@ -69,7 +69,7 @@ impl<M: StepModel + Send> Mppi<M> {
             }
         }
         self.planned_for = step;
-        self.batch.start(&x[..n], &x[n..], &mut self.start);
+        self.batch.start_at(step as f64 * self.task.dt, &x[..n], &x[n..], &mut self.start);
         let (task, settings, plan, start) = (&self.task, &self.settings, &self.plan, &self.start);
         let len = start.len();
         self.batch.for_each(&mut self.blocks, |model, state, tau, block| {

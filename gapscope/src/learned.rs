@@ -1,0 +1,72 @@
+//! Networks that `gapscope train` wrote, loaded back as models that step.
+
+use crate::cli::Kind;
+use anyhow::{Context, Result, bail, ensure};
+use gapscope_diagnosis::Contender;
+use gapscope_dynamics::Model;
+use gapscope_effects::Plant;
+use gapscope_network::{Mlp, Net, from_json, from_safetensors};
+use gapscope_pure::Pure;
+use gapscope_residual::{Hybrid, On};
+use serde::Deserialize;
+use std::path::Path;
+
+/// What `training.json` says that the weights do not.
+#[derive(Debug, Deserialize)]
+struct Setting {
+    schema: String,
+    kind: String,
+    on: Option<On>,
+    joints: Vec<String>,
+    /// Time of a step, s.
+    dt: f64,
+}
+
+/// The model of `kind` in a folder that `gapscope train` wrote, or with other weights of that folder (safetensors or JSON):
+/// a residual on the robot's own model, or a network alone.
+///
+/// # Errors
+/// Files that are missing or hold something else, another kind, other joints than the robot's, or a network of another
+/// shape; the text names file, cause and mend.
+pub fn load(path: &Path, kind: Kind, robot: &Model) -> Result<Contender> {
+    let weights = if path.is_dir() { path.join("weights.safetensors") } else { path.to_owned() };
+    let network = network(&weights)?;
+    let record = weights.with_file_name("training.json");
+    let text = std::fs::read_to_string(&record).with_context(|| {
+        format!("cannot read {}, which says what the weights beside it were trained for", record.display())
+    })?;
+    let wrong = || format!("{} is no record of gapscope train", record.display());
+    let setting: Setting = serde_json::from_str(&text).with_context(wrong)?;
+    ensure!(setting.schema == "gapscope.training/1", "{}: its schema is {:?}", wrong(), setting.schema);
+    if setting.kind != kind.name() {
+        bail!("{} holds a {} network, expected a {}; give it with --{0}", path.display(), setting.kind, kind.name());
+    }
+    let joints: Vec<&str> = robot.joints().iter().map(|j| j.name.as_str()).collect();
+    ensure!(
+        setting.joints == joints,
+        "{} was trained for the joints {}, the robot has {}; train it for this robot, with the same --lock",
+        path.display(),
+        setting.joints.join(", "),
+        joints.join(", ")
+    );
+    let dt = setting.dt;
+    ensure!(dt.is_finite() && dt > 0.0, "{}: its step dt is {dt}, expected seconds above zero", record.display());
+    let fits = || format!("{} does not fit {}", weights.display(), record.display());
+    Ok(match kind {
+        Kind::Residual => {
+            let hybrid = Hybrid::new(Plant::nominal(robot, dt), network, setting.on.unwrap_or_default());
+            Contender::with_own_step("hybrid", hybrid.with_context(fits)?)
+        }
+        Kind::Pure => Contender::with_own_step("pure", Pure::new(joints.len(), dt, network).with_context(fits)?),
+    })
+}
+
+fn network(weights: &Path) -> Result<Net<f32>> {
+    let bytes = std::fs::read(weights).with_context(|| format!("cannot read the weights {}", weights.display()))?;
+    let network: Result<Mlp<f32>> = match weights.extension().and_then(|e| e.to_str()) {
+        Some("safetensors") => from_safetensors(&bytes).map_err(Into::into),
+        Some("json") => String::from_utf8(bytes).map_err(Into::into).and_then(|text| Ok(from_json(&text)?)),
+        _ => bail!("{}: weights are read from .safetensors and .json files", weights.display()),
+    };
+    Ok(Net::new(network.with_context(|| format!("{} holds no weights", weights.display()))?))
+}

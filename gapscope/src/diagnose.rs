@@ -39,13 +39,17 @@ pub fn with_progress(loaded: Loaded) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// Writes diagnosis.json, corrected.json and report.html into a folder.
+/// Writes diagnosis.json, corrected.json, report.html and, where one is proposed, the next motion into a folder.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write(outcome: &Outcome, out: &Path) -> Result<()> {
     output::write(&out.join("diagnosis.json"), &serde_json::to_string_pretty(&outcome.diagnosis)?)?;
     output::write(&out.join("corrected.json"), &outcome.corrected.to_json()?)?;
+    let proposed = outcome.diagnosis.next_experiment.as_ref().and_then(|next| next.trajectory.as_ref());
+    if let Some((file, trajectory)) = proposed.zip(outcome.trajectory.as_ref()) {
+        output::write(&out.join(file), &trajectory.to_csv())?;
+    }
     let mut evidence = outcome.evidence.clone();
     evidence.corrected_file = out.join("corrected.json").display().to_string();
     output::write(&out.join("report.html"), &report::html(&outcome.diagnosis, &evidence))

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Names of the files that a diagnosis writes.
-pub const RESULTS: [&str; 3] = ["diagnosis.json", "report.html", "corrected.json"];
+pub const RESULTS: [&str; 4] = ["diagnosis.json", "report.html", "corrected.json", "next_experiment.csv"];
 
 /// The folder for the results: the one given, or a new one beside the first log, named after it.
 ///

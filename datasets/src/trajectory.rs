@@ -107,9 +107,12 @@ impl Trajectory {
             };
             let t = number(&time_column)?;
             if time.last().is_some_and(|last| t <= *last) {
-                return Err(LogError::new(LogErrorKind::TimeNotIncreasing, format!("time is {t} s, not after the row before"))
-                    .row(row)
-                    .column("time"));
+                return Err(LogError::new(
+                    LogErrorKind::TimeNotIncreasing,
+                    format!("time is {t} s, not after the row before"),
+                )
+                .row(row)
+                .column("time"));
             }
             time.push(t);
             for (samples, columns) in samples.iter_mut().zip(&columns) {
@@ -199,7 +202,8 @@ mod tests {
         }
         for t in [0.503, 1.999, 2.001, 3.337, 6.0, 7.49] {
             let h = 1e-4;
-            let ((before, _, _), (_, v, a), (after, _, _)) = (reference.at(t - h), reference.at(t), reference.at(t + h));
+            let ((before, _, _), (_, v, a), (after, _, _)) =
+                (reference.at(t - h), reference.at(t), reference.at(t + h));
             let (at, _, _) = reference.at(t);
             for j in 0..6 {
                 assert_abs_diff_eq!(v[j], (after[j] - before[j]) / (2.0 * h), epsilon = 1e-5);

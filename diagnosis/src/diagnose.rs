@@ -485,7 +485,8 @@ impl Logs<'_> {
         evidence.remaining = (!found.is_empty()).then_some(remaining);
         progress("next experiment", 0.95);
         let (next_experiment, trajectory) =
-            experiment::next_experiment(&self.data(&chosen.noise), &chosen.all, &chosen.choice, rivals, &found)?.unzip();
+            experiment::next_experiment(&self.data(&chosen.noise), &chosen.all, &chosen.choice, rivals, &found)?
+                .unzip();
         let diagnosis = Diagnosis {
             schema: DIAGNOSIS_SCHEMA.to_owned(),
             robot: model.name().to_owned(),

@@ -71,7 +71,8 @@ impl Design {
             let of = model.joints().iter().zip(&self.parts).filter(|(_, part)| (**part > 0.0) == on);
             of.map(|(joint, _)| joint.name.as_str()).collect()
         };
-        let which = if named(false).is_empty() { "all joints".into() } else { format!("{} alone", named(true).join(", ")) };
+        let which =
+            if named(false).is_empty() { "all joints".into() } else { format!("{} alone", named(true).join(", ")) };
         format!("{family} of {which}, {} s", LENGTH.0)
     }
 }
@@ -116,17 +117,15 @@ pub fn next_experiment(
     let tried: Vec<(f64, Design, Trajectory)> = library(data.model.dof(), &pair.concerned())
         .into_par_iter()
         .filter_map(|design| Some((design.trajectory(data.model)?, design)))
-        .map(|(trajectory, design)| {
-            Ok((pair.separation(data, &effects, side, &trajectory)?, design, trajectory))
-        })
+        .map(|(trajectory, design)| Ok((pair.separation(data, &effects, side, &trajectory)?, design, trajectory)))
         .collect::<Result<_, EffectError>>()?;
     // The first of equals: the order of the library does not depend on the number of threads.
     let best = tried.into_iter().reduce(|best, other| if other.0 > best.0 { other } else { best });
     let proposal = match best {
         Some((separation, design, trajectory)) if separation >= ENOUGH => {
             let motion = format!(
-                "follow {FILE}: {}. {} and {other} would then lie {separation:.0} standard errors apart. \
-                 Collisions are not looked at; diagnose the new log together with these",
+                "follow {FILE} (look for collisions first): {}. {} and {other} would then lie {separation:.0} standard \
+                 errors apart",
                 design.words(data.model),
                 tied.kind,
             );
@@ -137,7 +136,8 @@ pub fn next_experiment(
         least => {
             let separation = least.map_or(0.0, |(separation, ..)| separation);
             let all: Vec<Kind> = [kinds(problem, &choice.set), kinds(problem, &rival.choice.set)].concat();
-            let named = |kind: &Kind| *kind == rival.without || tied.indistinguishable_from.iter().any(|k| k == kind.name());
+            let named =
+                |kind: &Kind| *kind == rival.without || tied.indistinguishable_from.iter().any(|k| k == kind.name());
             let pair: Vec<Kind> = all.into_iter().filter(named).collect();
             let motion = format!(
                 "no motion within the limits of this robot sets them more than {separation:.1} standard errors apart: {}",
@@ -155,7 +155,7 @@ fn beyond_motion(kinds: &[Kind]) -> &'static str {
     if has(Kind::ExternalContact) {
         "log again with nothing touching the robot"
     } else if has(Kind::GravityMisalignment) {
-        "log with the base turned about the vertical: a tilt turns with it, what belongs to a joint does not"
+        "log with the base turned about the vertical: what a tilt does changes, what belongs to a joint stays"
     } else if has(Kind::TorqueGainError) {
         "repeat the motion with a known mass at the flange: a gain scales its torque, other effects do not"
     } else if has(Kind::Payload) {
@@ -172,9 +172,11 @@ pub fn motion_to_excite(model: &Model) -> Proposal {
     let design = Design { kind: ReferenceKind::Optimised, speed: 1.0, seed: 0, parts: vec![1.0; model.dof()] };
     let trajectory = if model.dof() > 0 { design.trajectory(model) } else { None };
     let motion = match &trajectory {
-        Some(_) => format!("follow {FILE}: {}. Collisions are not looked at", design.words(model)),
-        None => "move every joint through a good part of its range for 20 s or more, at several speeds, in both directions"
-            .to_owned(),
+        Some(_) => format!("follow {FILE} (look for collisions first): {}", design.words(model)),
+        None => {
+            "move every joint through a good part of its range for 20 s or more, at several speeds, in both directions"
+                .to_owned()
+        }
     };
     let next = NextExperiment {
         why: "the joints hardly move in these logs".into(),

@@ -33,5 +33,6 @@ mod verdict;
 pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};
 pub use diagnose::{Outcome, Progress, diagnose};
 pub use evaluate::{Predictions, evaluate};
+pub use experiment::FILE as NEXT_EXPERIMENT;
 pub use gapscope_effects::EncoderSide;
 pub use rollout::{BoundGrowth, ModelRollouts, RolloutError, RolloutOptions, Rollouts, rollouts};

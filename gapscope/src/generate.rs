@@ -235,6 +235,37 @@ mod tests {
     }
 
     #[test]
+    fn follows_the_motion_that_a_diagnosis_proposes() {
+        let dir = tempfile::tempdir().unwrap();
+        let [results, logs] = ["results", "logs"].map(|name| dir.path().join(name));
+        let model = robots::model("double_pendulum").unwrap().unwrap().model;
+        let outcome = gapscope_diagnosis::diagnose(&model, &[], vec![], &|_, _| {}).unwrap();
+        crate::diagnose::write(&outcome, &results).unwrap();
+        let file = results.join("next_experiment.csv");
+        let line = format!("double_pendulum --episodes 1 --trajectory {}", file.display());
+        let told = generated(&line, &logs).unwrap();
+        assert!(told.contains("logs of 20 s"), "{told}");
+        let joints: Vec<String> = model.joints().iter().map(|j| j.name.clone()).collect();
+        let (logged, _) =
+            gapscope_datasets::read_logs(&[logs.join("episode_0.csv")], &joints, &Default::default()).unwrap();
+        let asked = outcome.trajectory.clone().unwrap();
+        for j in 0..2 {
+            let (last, end) = (logged[0].position[j].last().unwrap(), asked.position[j].last().unwrap());
+            assert!((last - end).abs() < 1e-3, "{last} {end}");
+        }
+        // Nothing is proposed any more: the file of before would mislead.
+        let mut settled = outcome;
+        (settled.diagnosis.next_experiment, settled.trajectory) = (None, None);
+        crate::diagnose::write(&settled, &results).unwrap();
+        assert!(!file.exists());
+        std::fs::write(&file, "time,position.joint1\n0,1\n").unwrap();
+        let said = format!("{:#}", generated(&line, &dir.path().join("none")).unwrap_err());
+        assert!(said.contains("next_experiment.csv") && said.contains("position.joint2"), "{said}");
+        let both = ["gapscope", "generate", "--trajectory", "a.csv", "--seconds", "3"];
+        assert!(Cli::try_parse_from(both).is_err(), "the file says how long");
+    }
+
+    #[test]
     fn what_it_writes_is_read_without_findings() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("logs");

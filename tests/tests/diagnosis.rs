@@ -794,7 +794,10 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
     assert_change(&json["shrink"]["one_step"], &[]);
     json["shrink"]["rollout"].as_array().unwrap().iter().for_each(|change| assert_change(change, &["horizon"]));
     assert_keys(&json["shrink"]["reference"], &["noise_floor", "residual_network", "pure_network"], &[]);
-    assert!(json["next_experiment"].is_null() || keys(&json["next_experiment"]) == ["motion", "separates", "separation", "trajectory", "why"]);
+    assert!(
+        json["next_experiment"].is_null()
+            || keys(&json["next_experiment"]) == ["motion", "separates", "separation", "trajectory", "why"]
+    );
 
     for power in json["power"].as_array().unwrap() {
         assert_keys(power, &["kind", "joints", "parameter", "size", "unit"], &[]);

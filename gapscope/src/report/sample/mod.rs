@@ -87,7 +87,7 @@ pub fn explained() -> Case {
         next_experiment: Some(NextExperiment {
             why: "A payload and an error of the last link's inertia pull alike while the wrist keeps its direction.".into(),
             separates: vec!["payload".into(), "link_inertia_error".into()],
-            motion: "follow next_experiment.csv: moves between postures with pauses of panda_joint5, panda_joint7 alone, 20 s. payload and link_inertia_error would then lie 34 standard errors apart. Collisions are not looked at; diagnose the new log together with these".into(),
+            motion: "follow next_experiment.csv (look for collisions first): moves between postures with pauses of panda_joint5, panda_joint7 alone, 20 s. payload and link_inertia_error would then lie 34 standard errors apart".into(),
             trajectory: Some("next_experiment.csv".into()),
             separation: Some(34.2),
         }),

@@ -9,7 +9,7 @@ use gapscope_tests::{diagnose, robot, simulate};
 use std::collections::BTreeMap;
 
 fn logs(model: &Model, effects: &[Effect]) -> Vec<Episode> {
-    (1..3).map(|seed| simulate(model, effects, seed, 8.0, 250.0, 2e-6)).collect()
+    (1..4).map(|seed| simulate(model, effects, seed, 8.0, 250.0, 2e-6)).collect()
 }
 
 /// An effect of a kind at a joint, of a size.

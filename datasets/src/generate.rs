@@ -149,12 +149,28 @@ pub fn record(
     recipe: &Recipe,
     name: &str,
 ) -> Result<Episode, GenerateError> {
+    let reference = Reference::draw(recipe.motion, model, seed, recipe.speed, recipe.seconds)?;
+    follow(model, effects, plant, &reference, seed, recipe, name)
+}
+
+/// [`record`] along a reference of the caller's own, for `recipe.seconds`; the recipe's motion and speed are not looked at.
+///
+/// # Errors
+/// As [`generate`].
+pub fn follow(
+    model: &Model,
+    effects: &[Effect],
+    plant: &mut dyn Robot,
+    reference: &Reference,
+    seed: u64,
+    recipe: &Recipe,
+    name: &str,
+) -> Result<Episode, GenerateError> {
     recipe.check()?;
     let n = model.dof();
     let dt = 1.0 / recipe.rate;
     let mut random = Pcg64::seed_from_u64(seed ^ 0x5eed_0f10_6000_0001);
-    let reference = Reference::draw(recipe.motion, model, seed, recipe.speed, recipe.seconds)?;
-    let mut servo = Controller::new(model, effects, recipe.servo, &reference, recipe.seconds, dt)?;
+    let mut servo = Controller::new(model, effects, recipe.servo, reference, recipe.seconds, dt)?;
     let samples = (recipe.seconds * recipe.rate).round().max(2.0) as usize;
     let empty = || vec![Vec::with_capacity(samples); n];
     let (mut position, mut logged, mut command) = (empty(), empty(), empty());

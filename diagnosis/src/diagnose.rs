@@ -6,9 +6,11 @@ use crate::contact;
 use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
 use crate::estimate::Fit;
 use crate::evidence;
+use crate::experiment;
 use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
 use crate::horizon::{self, Errors};
+use crate::power;
 use crate::problem::{Problem, Term};
 use crate::refine::Data;
 use crate::regimes::regimes;
@@ -17,7 +19,7 @@ use crate::screen;
 use crate::select::{self, Choice, Rival};
 use crate::signals::{Signals, standstill};
 use crate::verdict;
-use gapscope_datasets::Episode;
+use gapscope_datasets::{Episode, Trajectory};
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, Effect, EffectError, EncoderSide, Kind, Plant, Range};
 use nalgebra::DMatrix;
@@ -66,6 +68,8 @@ pub struct Outcome {
     pub evidence: Evidence,
     /// The model with the effects found, for other logs.
     pub corrected: Corrected,
+    /// The motion of the next experiment, for the file that the diagnosis names.
+    pub trajectory: Option<Trajectory>,
 }
 
 /// Kinds that with many coefficients, or with one for all that a joint carries, can promise more than they keep.
@@ -582,6 +586,10 @@ impl Logs<'_> {
             evidence::evidence(model, &self.signals, &self.band, &self.still, problem, fit, &before.rows, &after.rows);
         let left = remaining.regimes.clone();
         evidence.remaining = (!found.is_empty()).then_some(remaining);
+        progress("next experiment", 0.95);
+        let (next_experiment, trajectory) =
+            experiment::next_experiment(&self.data(&chosen.noise), &chosen.all, &chosen.choice, rivals, &found)?
+                .unzip();
         let diagnosis = Diagnosis {
             schema: DIAGNOSIS_SCHEMA.to_owned(),
             robot: model.name().to_owned(),
@@ -589,7 +597,8 @@ impl Logs<'_> {
             data,
             verdict,
             gap: gap_of(&before),
-            next_experiment: verdict::next_experiment(&found),
+            next_experiment,
+            power: power::power(model, &chosen.all, &chosen.choice.set),
             effects: found,
             alternatives: alternatives(&chosen.all, rivals),
             unexplained: Unexplained { fraction: unexplained, regimes: left },
@@ -601,7 +610,7 @@ impl Logs<'_> {
             },
         };
         progress("done", 1.0);
-        Ok(Outcome { diagnosis, evidence, corrected })
+        Ok(Outcome { diagnosis, evidence, corrected, trajectory: trajectory.flatten() })
     }
 
     fn found_effects(
@@ -652,6 +661,7 @@ impl Logs<'_> {
         let model = self.model;
         let nothing = || Change { before: Some(0.0), after: Some(0.0), shrink: None, ci95: None };
         let zero: PerJoint = gap::by_joint(model, std::iter::repeat_n(0.0, model.dof()));
+        let (next, trajectory) = experiment::motion_to_excite(model);
         let diagnosis = Diagnosis {
             schema: DIAGNOSIS_SCHEMA.to_owned(),
             robot: model.name().to_owned(),
@@ -673,7 +683,8 @@ impl Logs<'_> {
                 rollout: Vec::new(),
                 reference: Reference { noise_floor: 0.0, residual_network: None, pure_network: None },
             },
-            next_experiment: Some(verdict::motion_to_excite()),
+            next_experiment: Some(next),
+            power: Vec::new(),
         };
         let corrected = Corrected {
             schema: MODEL_SCHEMA.to_owned(),
@@ -685,7 +696,7 @@ impl Logs<'_> {
             alignment: 0.0,
             effects: Vec::new(),
         };
-        Outcome { diagnosis, evidence: Evidence::default(), corrected }
+        Outcome { diagnosis, evidence: Evidence::default(), corrected, trajectory }
     }
 }
 

@@ -395,11 +395,7 @@ impl Problem {
             }
             self.accumulate(band);
         }
-        for (rows, sigma) in self.joints.iter_mut().zip(&self.sigma) {
-            for (weight, target) in rows.robust.iter_mut().zip(&rows.linear_target) {
-                *weight /= 1.0 + (INEXACT * target / sigma).powi(2);
-            }
-        }
+        self.allow_for_inexact_laws();
         self.least = (0..self.joints.len())
             .map(|j| {
                 let misfit = (self.sigma[j].powi(2) - self.noise[j].powi(2)).max(0.0).sqrt();
@@ -407,6 +403,26 @@ impl Problem {
             })
             .collect();
         self.accumulate(band);
+    }
+
+    fn allow_for_inexact_laws(&mut self) {
+        for (rows, sigma) in self.joints.iter_mut().zip(&self.sigma) {
+            for (weight, target) in rows.robust.iter_mut().zip(&rows.linear_target) {
+                *weight /= 1.0 + (INEXACT * target / sigma).powi(2);
+            }
+        }
+    }
+
+    /// Weighs rows that are not measured yet as another problem of the same robot weighs its own.
+    pub fn weigh_like(&mut self, other: &Problem, band: &Band) {
+        (self.sigma, self.correlation) = (other.sigma.clone(), other.correlation.clone());
+        self.allow_for_inexact_laws();
+        self.accumulate(band);
+    }
+
+    /// Weighted inner products of some columns with others, over all rows.
+    pub fn gram(&self, left: &[usize], right: &[usize]) -> DMatrix<f64> {
+        DMatrix::from_fn(left.len(), right.len(), |i, j| self.total.gram[(left[i], right[j])])
     }
 
     /// Normal equations of every block. Rows are weighted, not whitened: whitening would rest the fit on the fast edges of

@@ -38,6 +38,25 @@ pub struct Diagnosis {
     pub shrink: Shrink,
     /// The motion that would separate what these logs cannot; `None` where nothing is left to separate.
     pub next_experiment: Option<NextExperiment>,
+    /// The least size of each effect that these logs would have revealed; an extension of the schema.
+    #[serde(default)]
+    pub power: Vec<Power>,
+}
+
+/// The least size of an effect that the logs would have revealed beside the effects found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Power {
+    /// Public name in the catalogue.
+    pub kind: String,
+    /// Joints affected, by name; empty for robot-wide effects.
+    pub joints: Vec<String>,
+    /// The parameter whose size it is, by its public name.
+    pub parameter: String,
+    /// Its least size, of either sign; of `gain` the least distance from one; of the `stiffness` of an elastic drive and the
+    /// `limit` of a saturation the greatest value. `None` where these logs show no size of it.
+    pub size: Option<f64>,
+    /// Unit.
+    pub unit: String,
 }
 
 /// What was read.
@@ -278,8 +297,16 @@ pub struct NextExperiment {
     pub why: String,
     /// Kinds of effect that it separates.
     pub separates: Vec<String>,
-    /// The motion in words; a trajectory file comes with a later version.
+    /// The motion in words, or what else would tell where no motion does.
     pub motion: String,
+    /// File beside the diagnosis that holds the motion, a table of `time` and every joint's `position.`, `velocity.` and
+    /// `acceleration.`; `None` where no motion helps.
+    #[serde(default)]
+    pub trajectory: Option<String>,
+    /// How many standard errors apart the kinds would lie, logs and motion taken together; `None` where nothing is to be
+    /// separated.
+    #[serde(default)]
+    pub separation: Option<f64>,
 }
 
 /// Result of `evaluate`: the gap on other logs, before and after.

@@ -35,7 +35,7 @@ const SHORTLIST: usize = 12;
 /// Cost of a kind that few robots have: where two kinds explain the same, it is the commoner one, by prior.
 const RARE_COST: f64 = 2.0;
 /// A candidate stays where leaving it out costs more than this many standard errors of the paired difference over blocks.
-const STANDARD_ERRORS: f64 = 2.0;
+pub const STANDARD_ERRORS: f64 = 2.0;
 /// Kinds whose signature is cut from the measured effort or differentiates the position four times: it holds their noise,
 /// and so explains some of it, held-out rows included.
 const HOLD_NOISE: [Kind; 3] = [Kind::TorqueSaturation, Kind::JointElasticity, Kind::Backlash];
@@ -252,7 +252,7 @@ fn objective(problem: &Problem, set: &[usize]) -> f64 {
 }
 
 /// Cost of the complexity of a set, in units of deviance.
-fn cost(problem: &Problem, set: &[usize]) -> f64 {
+pub fn cost(problem: &Problem, set: &[usize]) -> f64 {
     kinds(problem, set)
         .into_iter()
         .map(|kind| {
@@ -333,13 +333,26 @@ fn moves(problem: &Problem, set: &[usize], forbidden: &[Kind], reach: Reach) -> 
 
 /// Whether two candidates must not stand side by side: two of one kind at the same joints, two accounts of the same force,
 /// or two accounts of where the encoder sits.
-fn excludes(problem: &Problem, a: usize, b: usize) -> bool {
+pub fn excludes(problem: &Problem, a: usize, b: usize) -> bool {
     let (a, b) = (&problem.entries[a].candidate, &problem.entries[b].candidate);
     let both = |family: &[Kind]| family.contains(&a.kind) && family.contains(&b.kind);
     let elastic = |c: &Candidate| matches!(c.kind, Kind::JointElasticity | Kind::Backlash);
     (a.joints == b.joints && (a.kind == b.kind || both(&DRY) || both(&DRIVE) || both(&CONSTANT)))
         || both(&LATE)
         || (elastic(a) && elastic(b) && a.side != b.side)
+}
+
+/// Whether a candidate's kind is one that joints usually share and stands at other joints of the set too.
+fn is_shared(problem: &Problem, set: &[usize], c: usize) -> bool {
+    let kind = problem.entries[c].candidate.kind;
+    SHARED.contains(&kind) && set.iter().filter(|&&other| problem.entries[other].candidate.kind == kind).count() > 1
+}
+
+/// Root mean square torque by which a candidate of a set must move a joint to be named on its account, N m or N.
+pub fn least_moved(problem: &Problem, set: &[usize], c: usize, joint: usize) -> f64 {
+    let least = if is_shared(problem, set, c) { SHARED_SIZE } else { 1.0 } * problem.least[joint];
+    let holds_noise = HOLD_NOISE.contains(&problem.entries[c].candidate.kind);
+    if holds_noise { least.max(OVER_NOISE * problem.noise[joint]) } else { least }
 }
 
 /// Takes away, weakest first, what does not lower the held-out deviance beyond doubt or does not matter.
@@ -356,16 +369,9 @@ fn prune(problem: &Problem, mut choice: Choice) -> Choice {
                 let own_theta: Vec<f64> =
                     columns.iter().zip(&theta).filter(|(col, _)| own.contains(col)).map(|(_, t)| *t).collect();
                 let moved = problem.contribution(&own.clone().collect::<Vec<_>>(), &own_theta);
-                let kind = problem.entries[c].candidate.kind;
-                let others = choice.set.iter().filter(|&&other| problem.entries[other].candidate.kind == kind).count();
-                let shared = SHARED.contains(&kind) && others > 1;
+                let shared = is_shared(problem, &choice.set, c);
                 let needed = if shared { SHARED_STANDARD_ERRORS } else { STANDARD_ERRORS };
-                let part = if shared { SHARED_SIZE } else { 1.0 };
-                let least = |j: usize| {
-                    let least = part * problem.least[j];
-                    if HOLD_NOISE.contains(&kind) { least.max(OVER_NOISE * problem.noise[j]) } else { least }
-                };
-                let matters = moved.iter().enumerate().any(|(j, rms)| *rms > least(j));
+                let matters = moved.iter().enumerate().any(|(j, rms)| *rms > least_moved(problem, &choice.set, c, j));
                 let matters = matters && problem.plausible(c, &own_theta);
                 let total = |choice: &Choice| choice.blocks.iter().sum::<f64>();
                 let score = if !matters {

@@ -1,6 +1,6 @@
-//! The answer in a word, and what to do next.
+//! The answer in a word.
 
-use crate::schema::{FoundEffect, NextExperiment, Verdict};
+use crate::schema::Verdict;
 
 /// Fewer rows than this tell nothing.
 pub const LEAST_ROWS: usize = 50;
@@ -60,41 +60,5 @@ impl Judged {
             (false, false) => Verdict::Explained,
             (false, true) => Verdict::PartlyExplained,
         }
-    }
-}
-
-/// The motion that would separate the first effect that these logs cannot tell from another.
-pub fn next_experiment(effects: &[FoundEffect]) -> Option<NextExperiment> {
-    let effect = effects.iter().find(|e| !e.indistinguishable_from.is_empty())?;
-    let other = effect.indistinguishable_from.first()?;
-    let joints = if effect.joints.is_empty() { "all joints".to_owned() } else { effect.joints.join(", ") };
-    let pair = [effect.kind.as_str(), other.as_str()];
-    let has = |kind: &str| pair.contains(&kind);
-    let motion = if has("torque_bias") && has("gravity_misalignment") {
-        format!(
-            "log {joints} with the base turned, or at poses where gravity acts on it differently: a bias stays, a tilt does not"
-        )
-    } else if has("torque_bias") && has("parallel_spring") {
-        format!("move {joints} slowly from one end of its range to the other: a bias stays, a spring grows")
-    } else if has("torque_gain_error") {
-        "repeat the motion with a known mass at the flange: a gain scales its torque, other effects do not".to_owned()
-    } else {
-        format!("move {joints} over more of the range, at several speeds and in both directions")
-    };
-    Some(NextExperiment {
-        why: format!("{} and {other} predict these logs equally well", effect.kind),
-        separates: vec![effect.kind.clone(), other.clone()],
-        motion,
-    })
-}
-
-/// What to log where nothing was excited.
-pub fn motion_to_excite() -> NextExperiment {
-    NextExperiment {
-        why: "the joints hardly move in these logs".into(),
-        separates: Vec::new(),
-        motion:
-            "move every joint through a good part of its range for 20 s or more, at several speeds, in both directions"
-                .into(),
     }
 }

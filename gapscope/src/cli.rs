@@ -77,7 +77,7 @@ pub struct Diagnose {
     /// Robot and logs
     #[command(flatten)]
     pub input: Input,
-    /// Folder for diagnosis.json, report.html and corrected.json [default: a new folder beside the first log]
+    /// Folder for diagnosis.json, report.html, corrected.json and next_experiment.csv [default: a new folder beside the first log]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Replace results that are in the folder already
@@ -198,6 +198,9 @@ pub struct Generate {
     /// Pace of the motion; limits of the URDF may slow it down
     #[arg(long, default_value_t = 1.0)]
     pub speed: f64,
+    /// Follow this motion from first to last row, such as the next_experiment.csv that `diagnose` proposes
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "speed", "seconds"])]
+    pub trajectory: Option<PathBuf>,
     /// Servo, which knows the URDF and not the effects
     #[arg(long, value_enum, default_value_t = Drive::ComputedTorque)]
     pub servo: Drive,

@@ -4,7 +4,7 @@ use crate::cli::Diagnose;
 use crate::input::{Loaded, load};
 use crate::{output, report, summary};
 use anyhow::{Context, Result};
-use gapscope_diagnosis::{Outcome, diagnose};
+use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, diagnose};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::Path;
@@ -39,13 +39,19 @@ pub fn with_progress(loaded: Loaded) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// Writes diagnosis.json, corrected.json and report.html into a folder.
+/// Writes diagnosis.json, corrected.json, report.html and, where one is proposed, the next motion into a folder.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write(outcome: &Outcome, out: &Path) -> Result<()> {
     output::write(&out.join("diagnosis.json"), &serde_json::to_string_pretty(&outcome.diagnosis)?)?;
     output::write(&out.join("corrected.json"), &outcome.corrected.to_json()?)?;
+    let proposed = outcome.diagnosis.next_experiment.as_ref().and_then(|next| next.trajectory.as_ref());
+    match proposed.zip(outcome.trajectory.as_ref()) {
+        Some((file, trajectory)) => output::write(&out.join(file), &trajectory.to_csv())?,
+        // The advice of an earlier diagnosis in this folder is out of date.
+        None => output::remove(&out.join(NEXT_EXPERIMENT))?,
+    }
     let mut evidence = outcome.evidence.clone();
     evidence.corrected_file = out.join("corrected.json").display().to_string();
     output::write(&out.join("report.html"), &report::html(&outcome.diagnosis, &evidence))

@@ -3,9 +3,9 @@
 use crate::cli::Generate;
 use crate::output;
 use anyhow::{Context, Result, bail};
-use gapscope_datasets::{Episode, Perturbation, Recipe, Sensors, generate, write_csv};
+use gapscope_datasets::{Episode, Perturbation, Recipe, Reference, Sensors, Trajectory, follow, generate, write_csv};
 use gapscope_dynamics::{Model, robots};
-use gapscope_effects::Effect;
+use gapscope_effects::{Effect, Plant};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -22,6 +22,9 @@ struct Truth<'a> {
     seed: u64,
     episodes: u64,
     recipe: Recipe,
+    /// The file that was followed instead of a motion of the recipe.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trajectory: Option<String>,
     perturbation: Option<Perturbation>,
     effects: &'a [Effect],
 }
@@ -43,7 +46,12 @@ pub fn run(args: &Generate) -> Result<String> {
     if let Some(perturbation) = perturbation {
         effects.extend(perturbation.draw(&model, args.seed));
     }
-    let recipe = recipe(args);
+    let mut recipe = recipe(args);
+    let trajectory = args.trajectory.as_deref().map(|file| read_trajectory(file, &model)).transpose()?;
+    if let Some(trajectory) = &trajectory {
+        recipe.seconds = trajectory.duration();
+    }
+    let reference = trajectory.as_ref().map(Reference::along);
     let out = match &args.out {
         Some(out) => out.clone(),
         None => output::new_folder(Path::new(""), "gapscope-logs")?,
@@ -60,7 +68,7 @@ pub fn run(args: &Generate) -> Result<String> {
 
     let bar = bar(args.episodes);
     logs.par_iter().enumerate().try_for_each(|(i, file)| -> Result<()> {
-        let log = episode(&model, &effects, args.seed, i as u64, &recipe)?;
+        let log = episode(&model, &effects, args.seed, i as u64, &recipe, reference.as_ref())?;
         // Not before: what cannot be simulated leaves no folder behind.
         std::fs::create_dir_all(&out).with_context(|| format!("cannot make the folder {}", out.display()))?;
         write_csv(file, &log, args.force)?;
@@ -70,9 +78,11 @@ pub fn run(args: &Generate) -> Result<String> {
     output::write(&urdf_file, &urdf)?;
     bar.finish_and_clear();
     let (robot, seed, episodes) = (model.name(), args.seed, args.episodes);
-    let truth = Truth { schema: TRUTH_SCHEMA, robot, seed, episodes, recipe, perturbation, effects: &effects };
+    let trajectory = args.trajectory.as_ref().map(|file| file.display().to_string());
+    let truth =
+        Truth { schema: TRUTH_SCHEMA, robot, seed, episodes, recipe, trajectory, perturbation, effects: &effects };
     output::write(&truth_file, &(serde_json::to_string_pretty(&truth)? + "\n"))?;
-    Ok(told(&model, &effects, args, &out))
+    Ok(told(&model, &effects, args, &recipe, &out))
 }
 
 /// The robot's URDF and model: a file's, or a built-in one's where there is no file of the name.
@@ -124,10 +134,36 @@ fn recipe(args: &Generate) -> Recipe {
     }
 }
 
-fn episode(model: &Model, effects: &[Effect], seed: u64, index: u64, recipe: &Recipe) -> Result<Episode> {
+/// A motion of all joints from a CSV file.
+fn read_trajectory(file: &Path, model: &Model) -> Result<Trajectory> {
+    let name = file.display();
+    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read the trajectory {name}"))?;
+    let joints: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+    Trajectory::from_csv(&text, &joints).with_context(|| format!("{name} is not a trajectory of {}", model.name()))
+}
+
+fn episode(
+    model: &Model,
+    effects: &[Effect],
+    seed: u64,
+    index: u64,
+    recipe: &Recipe,
+    reference: Option<&Reference>,
+) -> Result<Episode> {
     // Seeds of neighbouring data sets must not share episodes.
     let seed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index);
-    generate(model, effects, seed, recipe, &format!("episode_{index}.csv")).context("the logs cannot be simulated")
+    let name = format!("episode_{index}.csv");
+    let log = match reference {
+        None => generate(model, effects, seed, recipe, &name),
+        Some(reference) => {
+            let mut plant = Plant::new(model, effects, recipe.step())?;
+            if recipe.motor_encoders {
+                plant = plant.with_motor_encoders();
+            }
+            follow(model, effects, &mut plant, reference, seed, recipe, &name)
+        }
+    };
+    log.context("the logs cannot be simulated")
 }
 
 fn bar(episodes: u64) -> ProgressBar {
@@ -138,7 +174,7 @@ fn bar(episodes: u64) -> ProgressBar {
     bar
 }
 
-fn told(model: &Model, effects: &[Effect], args: &Generate, out: &Path) -> String {
+fn told(model: &Model, effects: &[Effect], args: &Generate, recipe: &Recipe, out: &Path) -> String {
     let out = out.display();
     let kinds: std::collections::BTreeSet<String> = effects.iter().map(|e| e.kind().to_string()).collect();
     let lacks =
@@ -150,8 +186,8 @@ fn told(model: &Model, effects: &[Effect], args: &Generate, out: &Path) -> Strin
         model.name(),
         model.dof(),
         args.episodes,
-        args.seconds,
-        args.rate,
+        recipe.seconds,
+        recipe.rate,
     )
 }
 
@@ -196,6 +232,37 @@ mod tests {
         let again = line.replace("--perturb", &format!("--effects {}", a.join("truth.json").display()));
         generated(&again, &d).unwrap();
         assert_eq!(bytes(&a)[..4], bytes(&d)[..4]);
+    }
+
+    #[test]
+    fn follows_the_motion_that_a_diagnosis_proposes() {
+        let dir = tempfile::tempdir().unwrap();
+        let [results, logs] = ["results", "logs"].map(|name| dir.path().join(name));
+        let model = robots::model("double_pendulum").unwrap().unwrap().model;
+        let outcome = gapscope_diagnosis::diagnose(&model, &[], vec![], &|_, _| {}).unwrap();
+        crate::diagnose::write(&outcome, &results).unwrap();
+        let file = results.join("next_experiment.csv");
+        let line = format!("double_pendulum --episodes 1 --trajectory {}", file.display());
+        let told = generated(&line, &logs).unwrap();
+        assert!(told.contains("logs of 20 s"), "{told}");
+        let joints: Vec<String> = model.joints().iter().map(|j| j.name.clone()).collect();
+        let (logged, _) =
+            gapscope_datasets::read_logs(&[logs.join("episode_0.csv")], &joints, &Default::default()).unwrap();
+        let asked = outcome.trajectory.clone().unwrap();
+        for j in 0..2 {
+            let (last, end) = (logged[0].position[j].last().unwrap(), asked.position[j].last().unwrap());
+            assert!((last - end).abs() < 1e-3, "{last} {end}");
+        }
+        // Nothing is proposed any more: the file of before would mislead.
+        let mut settled = outcome;
+        (settled.diagnosis.next_experiment, settled.trajectory) = (None, None);
+        crate::diagnose::write(&settled, &results).unwrap();
+        assert!(!file.exists());
+        std::fs::write(&file, "time,position.joint1\n0,1\n").unwrap();
+        let said = format!("{:#}", generated(&line, &dir.path().join("none")).unwrap_err());
+        assert!(said.contains("next_experiment.csv") && said.contains("position.joint2"), "{said}");
+        let both = ["gapscope", "generate", "--trajectory", "a.csv", "--seconds", "3"];
+        assert!(Cli::try_parse_from(both).is_err(), "the file says how long");
     }
 
     #[test]

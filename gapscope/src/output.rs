@@ -1,11 +1,12 @@
 //! Files out: whole or not at all, and never over what is there unless told to.
 
 use anyhow::{Context, Result, bail};
+use gapscope_diagnosis::NEXT_EXPERIMENT;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Names of the files that a diagnosis writes.
-pub const RESULTS: [&str; 3] = ["diagnosis.json", "report.html", "corrected.json"];
+pub const RESULTS: [&str; 4] = ["diagnosis.json", "report.html", "corrected.json", NEXT_EXPERIMENT];
 
 /// The folder for the results: the one given, or a new one beside the first log, named after it.
 ///
@@ -67,6 +68,19 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     file.write_all(bytes).with_context(fail)?;
     file.persist(path).with_context(fail)?;
     Ok(())
+}
+
+/// Removes a file if it is there.
+///
+/// # Errors
+/// The file cannot be removed.
+pub fn remove(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("cannot remove {}", path.display()))
+        }
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

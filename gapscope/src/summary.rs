@@ -5,8 +5,8 @@ mod change;
 use crate::report::terminal::{INDENT, Paint, WIDTH, block, blocks, column, cut, cut_to, fill, pad, wrap};
 use crate::report::{
     NONE, capital, changed, count, effect, estimate, figure, headline, implied_unit, interval, is_above_floor,
-    joint_list, largest, motion_unit, outstanding, percent, percent_figure, plain, probability_figure, regime, said_of,
-    significant, span, verdict, with_unit,
+    joint_list, largest, motion_unit, outstanding, percent, percent_figure, plain, power_line, probability_figure,
+    regime, said_of, significant, span, verdict, with_unit,
 };
 use change::{Cells, change_sign};
 use gapscope_diagnosis::schema::{Diagnosis, Estimate, Evaluation, FoundEffect, Parameter, Regime, Shrink, Verdict};
@@ -45,6 +45,9 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, color: bool) -> String
         );
     }
     block(&mut lines, &paint, "Notes", &notes(diagnosis));
+    if let (Verdict::NoGap, Some(line)) = (diagnosis.verdict, power_line(&diagnosis.power)) {
+        block(&mut lines, &paint, "Power", &wrap(&line, 2));
+    }
     if let Some(next) = &diagnosis.next_experiment {
         block(&mut lines, &paint, "Next", &wrap(&next.motion, 2));
     }

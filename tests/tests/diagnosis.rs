@@ -719,7 +719,7 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
             "shrink",
             "next_experiment",
         ],
-        &[],
+        &["power"],
     );
     assert_eq!((&json["schema"], &json["robot"]), (&"gapscope.diagnosis/1".into(), &"arm6".into()));
     assert_eq!(json["verdict"], "explained");
@@ -794,7 +794,14 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
     assert_change(&json["shrink"]["one_step"], &[]);
     json["shrink"]["rollout"].as_array().unwrap().iter().for_each(|change| assert_change(change, &["horizon"]));
     assert_keys(&json["shrink"]["reference"], &["noise_floor", "residual_network", "pure_network"], &[]);
-    assert!(json["next_experiment"].is_null() || keys(&json["next_experiment"]) == ["motion", "separates", "why"]);
+    assert!(
+        json["next_experiment"].is_null()
+            || keys(&json["next_experiment"]) == ["motion", "separates", "separation", "trajectory", "why"]
+    );
+
+    for power in json["power"].as_array().unwrap() {
+        assert_keys(power, &["kind", "joints", "parameter", "size", "unit"], &[]);
+    }
 
     let back: Diagnosis = serde_json::from_str(&text).unwrap();
     assert_eq!(back, outcome.diagnosis, "read back to the bit");

@@ -40,9 +40,14 @@ pub fn excitation(model: &Model, motion: &Reference, seconds: f64) -> Excitation
 }
 
 /// The Fourier series of most information that a random search with local improvement finds; a second or less.
-pub(super) fn optimised(model: &Model, seed: u64, speed: f64, seconds: f64) -> Result<Reference, ReferenceError> {
+pub(super) fn optimised(
+    model: &Model,
+    Range { middle, amplitude }: &Range,
+    seed: u64,
+    speed: f64,
+    seconds: f64,
+) -> Result<Reference, ReferenceError> {
     let mut random = Pcg64::seed_from_u64(seed);
-    let Range { middle, amplitude } = limits::range(model);
     let mut judge = Judge::new(model, seconds);
     let mut judged = |series: Fourier| -> Result<(f64, Fourier, Reference), ReferenceError> {
         let shape = Shape::Fourier(series.clone());
@@ -50,9 +55,9 @@ pub(super) fn optimised(model: &Model, seed: u64, speed: f64, seconds: f64) -> R
             limits::keep(model, Reference { middle: middle.clone(), scale: 1.0, rate: speed, shape }, seconds)?;
         Ok((judge.information(&motion), series, motion))
     };
-    let mut best = judged(Fourier::draw(&amplitude, &mut random))?;
+    let mut best = judged(Fourier::draw(amplitude, &mut random))?;
     for _ in 1..TRIES.0 {
-        let other = judged(Fourier::draw(&amplitude, &mut random))?;
+        let other = judged(Fourier::draw(amplitude, &mut random))?;
         if other.0 > best.0 {
             best = other;
         }

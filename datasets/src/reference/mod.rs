@@ -10,6 +10,7 @@ mod sweep;
 pub use excitation::{Excitation, excitation};
 pub use limits::ReferenceError;
 
+use crate::trajectory::Trajectory;
 use chirp::Chirp;
 use fourier::Fourier;
 use gapscope_dynamics::Model;
@@ -57,6 +58,7 @@ enum Shape {
     PointToPoint(PointToPoint),
     Chirp(Chirp),
     Sweep(Sweep),
+    Table(Trajectory),
 }
 
 impl Reference {
@@ -72,20 +74,53 @@ impl Reference {
         speed: f64,
         seconds: f64,
     ) -> Result<Reference, ReferenceError> {
+        Reference::draw_within(kind, model, &vec![1.0; model.dof()], seed, speed, seconds)
+    }
+
+    /// [`Reference::draw`] with each joint in a part of its ordinary range only: 1 for all of it, 0 for a joint that stands.
+    ///
+    /// # Errors
+    /// As [`Reference::draw`].
+    ///
+    /// # Panics
+    /// If `parts` has another length than the robot has joints.
+    pub fn draw_within(
+        kind: ReferenceKind,
+        model: &Model,
+        parts: &[f64],
+        seed: u64,
+        speed: f64,
+        seconds: f64,
+    ) -> Result<Reference, ReferenceError> {
+        assert_eq!(parts.len(), model.dof(), "one part a joint");
         limits::check("seconds", seconds)?;
         limits::check("speed", speed)?;
         let mut random = Pcg64::seed_from_u64(seed);
-        let Range { middle, amplitude } = limits::range(model);
+        let mut range = limits::range(model);
+        range.amplitude.iter_mut().zip(parts).for_each(|(amplitude, part)| *amplitude *= part);
+        if kind == ReferenceKind::Optimised {
+            return excitation::optimised(model, &range, seed, speed, seconds);
+        }
+        let Range { middle, amplitude } = range;
         let length = seconds * speed;
         let shape = match kind {
-            ReferenceKind::Optimised => return excitation::optimised(model, seed, speed, seconds),
-            ReferenceKind::Fourier => Shape::Fourier(Fourier::draw(&amplitude, &mut random)),
+            ReferenceKind::Fourier | ReferenceKind::Optimised => Shape::Fourier(Fourier::draw(&amplitude, &mut random)),
             ReferenceKind::PointToPoint => Shape::PointToPoint(PointToPoint::draw(&amplitude, length, &mut random)),
             ReferenceKind::Chirp => Shape::Chirp(Chirp::draw(&amplitude, length, &mut random)),
             ReferenceKind::Sweep => Shape::Sweep(Sweep::draw(&amplitude, &mut random)),
         };
         let reference = Reference { middle, scale: 1.0, rate: speed, shape };
         limits::keep(model, reference, seconds)
+    }
+
+    /// The motion of a table, from its first sample on; before and behind it the robot stands. Limits are not looked at.
+    ///
+    /// # Panics
+    /// If the table has fewer than two samples.
+    pub fn along(trajectory: &Trajectory) -> Reference {
+        assert!(trajectory.time.len() > 1, "two samples at least");
+        let middle = vec![0.0; trajectory.joints.len()];
+        Reference { middle, scale: 1.0, rate: 1.0, shape: Shape::Table(trajectory.clone()) }
     }
 
     /// Position, velocity and acceleration of every joint at time `t` s: rad, rad/s, rad/s² (m, m/s, m/s²), n each.
@@ -107,6 +142,7 @@ impl Reference {
             Shape::PointToPoint(shape) => shape.displacement(t, q, v, a),
             Shape::Chirp(shape) => shape.displacement(t, q, v, a),
             Shape::Sweep(shape) => shape.displacement(t, q, v, a),
+            Shape::Table(table) => table.at(t, q, v, a),
         }
         for j in 0..self.middle.len() {
             q[j] = self.middle[j] + self.scale * q[j];

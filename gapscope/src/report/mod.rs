@@ -9,6 +9,7 @@ mod effects;
 mod format;
 mod heatmap;
 mod joints;
+mod power;
 mod rest;
 mod rollout;
 mod score;
@@ -31,6 +32,7 @@ pub use format::{
     NONE, count, estimate, figure, percent, percent_figure, percent_interval, plain, probability_figure, significant,
     span, with_unit,
 };
+pub use power::line as power_line;
 pub use rollout::page as rollout_page;
 pub use score::html as score;
 pub use words::{
@@ -121,6 +123,10 @@ fn body(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
         }
         (section("alternatives", "What else it could be", "Other sets of effects that these logs do not exclude.", rest::alternatives(diagnosis)))
         (section("next", "The next experiment", "", rest::next_experiment(diagnosis)))
+        @if !diagnosis.power.is_empty() {
+            (section("power", "What these logs could have revealed", "The least size of each effect that would have been found. Anything smaller could be there, and nobody could tell from these logs.",
+                power::render(diagnosis)))
+        }
         (section("data", "Data", "", rest::data(diagnosis, evidence)))
         (section("reproduce", "How to reproduce", "", rest::reproduce(diagnosis, evidence)))
     }

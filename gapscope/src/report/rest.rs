@@ -72,6 +72,9 @@ pub fn next_experiment(diagnosis: &Diagnosis) -> Markup {
         div.callout {
             p { b { (next.motion) } }
             p { (next.why) }
+            @if let Some(file) = &next.trajectory {
+                p { code { (file) } " beside this report holds time, position, velocity and acceleration of every joint, from rest to rest, within the URDF’s limits. Diagnose its log together with these." }
+            }
             @if !kinds.is_empty() { p.muted { "Tells apart: " (words::list(&kinds, "and")) "." } }
         }
     }

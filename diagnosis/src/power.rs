@@ -1,0 +1,165 @@
+//! Power: the least size of each effect that the logs would have revealed beside the effects found.
+//!
+//! An effect of size θ along a direction φ of the problem lowers the deviance by θ² φᵀSφ, S being the information that the
+//! chosen set and the alignment leave in its columns (a Schur complement of the normal equations). It is named where that
+//! pays its cost of complexity, lies beyond the standard errors that pruning asks for, and moves some joint by as much
+//! torque as anything must that is to be named.
+
+use crate::problem::Problem;
+use crate::schema::Power;
+use crate::select;
+use gapscope_dynamics::{JointKind, Model};
+use gapscope_effects::{Candidate, EncoderSide, Kind};
+use nalgebra::{DMatrix, DVector};
+
+/// Part of a column's size below which what the set leaves of it is rounding.
+const ROUNDING: f64 = 1e-7;
+
+/// One size of an effect, and what of it is measured.
+struct Gauge {
+    parameter: &'static str,
+    /// Coefficients of a unit.
+    direction: Vec<f64>,
+    /// Whether the other coefficients of the effect may take any value beside, so that only what none of them can do counts.
+    beside_others: bool,
+}
+
+/// The least size of every effect at every joint; kinds in the order of the catalogue. The knob of an effect that has one,
+/// where it is not the size itself, is that in the middle of its grid.
+pub fn power(model: &Model, problem: &Problem, set: &[usize]) -> Vec<Power> {
+    let mut places: Vec<(usize, &[usize])> = Vec::new();
+    for entry in &problem.entries {
+        let order = Kind::ALL.iter().position(|kind| *kind == entry.candidate.kind).unwrap_or_default();
+        places.push((order, &entry.candidate.joints));
+    }
+    places.sort();
+    places.dedup();
+    places.into_iter().flat_map(|(order, joints)| sizes(model, problem, set, Kind::ALL[order], joints)).collect()
+}
+
+/// The least sizes of one kind at one place.
+fn sizes(model: &Model, problem: &Problem, set: &[usize], kind: Kind, joints: &[usize]) -> Vec<Power> {
+    let mut here: Vec<usize> = (0..problem.entries.len())
+        .filter(|&c| problem.entries[c].candidate.kind == kind && problem.entries[c].candidate.joints == joints)
+        .collect();
+    // With the encoder on the motor's side a spring or play shows in the link's motion, whatever the rotor's inertia.
+    let elastic = matches!(kind, Kind::JointElasticity | Kind::Backlash);
+    here.retain(|&c| !elastic || problem.entries[c].candidate.side == EncoderSide::Motor);
+    here.sort_by(|&a, &b| problem.entries[a].candidate.shape.total_cmp(&problem.entries[b].candidate.shape));
+    let Some(&first) = here.first() else { return Vec::new() };
+    let named = |parameter: &str, size: Option<f64>, unit: &str| Power {
+        kind: kind.name().to_owned(),
+        joints: joints.iter().map(|&j| model.joints()[j].name.clone()).collect(),
+        parameter: parameter.to_owned(),
+        size: size.filter(|size| size.is_finite()),
+        unit: unit.to_owned(),
+    };
+    if kind == Kind::TorqueSaturation {
+        // The knob is the size: the greatest limit of the grid that cuts enough away.
+        let seen = |&&c: &&usize| least(problem, set, c, &[1.0], false).is_some_and(|least| least <= 1.0);
+        let limit = here.iter().rev().find(seen).map(|&c| problem.entries[c].candidate.shape);
+        return vec![named("limit", limit, unit(model, joints, ["N m", "N"]))];
+    }
+    // A late effort is linear about no delay; a coupling's weight is a choice, not a size.
+    let late = matches!(kind, Kind::ActuationDelay | Kind::ActuatorLag);
+    let c = if late || kind == Kind::JointCoupling { first } else { here[here.len() / 2] };
+    let candidate = &problem.entries[c].candidate;
+    gauges(model, candidate)
+        .into_iter()
+        .map(|gauge| {
+            let theta = least(problem, set, c, &gauge.direction, gauge.beside_others)
+                // The alignment takes up half a sample of any delay.
+                .map(|theta| if late { theta + problem.bounds[0].1 } else { theta });
+            let coefficients: Vec<f64> = gauge.direction.iter().map(|x| x * theta.unwrap_or(1.0)).collect();
+            let effects = candidate.effects(model, &coefficients);
+            let effect = effects.iter().find(|effect| effect.kind() == kind);
+            let value = effect.and_then(|e| e.law().parameters().into_iter().find(|v| v.name == gauge.parameter));
+            let of_one = if kind == Kind::TorqueGainError { 1.0 } else { 0.0 };
+            let size = theta.and(value.as_ref()).and_then(|v| Some((v.value.first()? - of_one).abs()));
+            named(gauge.parameter, size, value.map_or("", |v| unit(model, joints, [v.unit, v.unit_prismatic])))
+        })
+        .collect()
+}
+
+fn unit(model: &Model, joints: &[usize], [turning, sliding]: [&'static str; 2]) -> &'static str {
+    let slides = joints.first().is_some_and(|&j| model.joints()[j].kind == JointKind::Prismatic);
+    if slides { sliding } else { turning }
+}
+
+/// What of an effect is measured. A payload, and what a link has too much, is a point at the link's own centre of mass; dry
+/// friction that drifts ends at nothing.
+fn gauges(model: &Model, candidate: &Candidate) -> Vec<Gauge> {
+    let along = |parameter, direction: &[f64]| Gauge { parameter, direction: direction.to_vec(), beside_others: false };
+    let point = |parameter| {
+        let body = candidate.joints.first().and_then(|&j| model.joints()[j].inertia.center_of_mass());
+        let [x, y, z] = body.unwrap_or_default().to_array();
+        along(parameter, &[1.0, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
+    };
+    let one = match candidate.kind {
+        Kind::ViscousFriction => along("viscous", &[1.0]),
+        Kind::CoulombFriction | Kind::PreslidingFriction => along("coulomb", &[1.0]),
+        Kind::LoadDependentFriction => along("load_coefficient", &[1.0]),
+        Kind::StribeckFriction => Gauge { beside_others: true, ..along("static", &[0.0, 1.0]) },
+        Kind::ThermalDrift => along("coulomb", &[0.0, 1.0]),
+        Kind::Armature => along("armature", &[1.0]),
+        Kind::TorqueGainError => along("gain", &[1.0]),
+        Kind::TorqueBias => along("bias", &[1.0]),
+        Kind::TorqueRipple => along("amplitude", &[1.0, 0.0]),
+        Kind::ParallelSpring => Gauge { beside_others: true, ..along("stiffness", &[1.0, 0.0]) },
+        Kind::JointZeroOffset => along("offset", &[1.0]),
+        Kind::JointElasticity => along("stiffness", &[0.0, 1.0]),
+        Kind::Backlash => along("gap", &[0.0, 1.0]),
+        Kind::Payload => point("mass"),
+        Kind::LinkInertiaError => point("mass_delta"),
+        Kind::JointCoupling => along("coulomb", &[0.0, 1.0, 0.0]),
+        Kind::ActuationDelay => along("delay", &[1.0]),
+        Kind::ActuatorLag => along("time_constant", &[1.0]),
+        Kind::GravityMisalignment => return vec![along("roll", &[0.0, 1.0]), along("pitch", &[1.0, 0.0])],
+        // When something pushes is not known before; a limit is no coefficient.
+        Kind::ExternalContact | Kind::TorqueSaturation => return Vec::new(),
+    };
+    vec![one]
+}
+
+/// The least multiple of a direction of a candidate's coefficients at which the selection names it beside a set; `None`
+/// where the logs do not show it.
+fn least(problem: &Problem, set: &[usize], c: usize, direction: &[f64], beside_others: bool) -> Option<f64> {
+    let others: Vec<usize> =
+        set.iter().copied().filter(|&other| other != c && !select::excludes(problem, other, c)).collect();
+    let with: Vec<usize> = others.iter().copied().chain([c]).collect();
+    let own: Vec<usize> = problem.entries[c].columns.clone().collect();
+    let base: Vec<usize> = problem.columns(&with).into_iter().filter(|column| !own.contains(column)).collect();
+    let gram = problem.gram(&own, &own);
+    let information = &gram - explained(problem, &base, &own);
+    let mut direction = DVector::from_column_slice(direction);
+    if beside_others {
+        let fixed = direction.imax();
+        let free: Vec<usize> = (0..own.len()).filter(|&i| i != fixed).collect();
+        let inner = DMatrix::from_fn(free.len(), free.len(), |i, j| information[(free[i], free[j])]);
+        let cross = DVector::from_fn(free.len(), |i, _| information[(free[i], fixed)]);
+        let answer = inner.cholesky()?.solve(&cross);
+        free.iter().zip(answer.iter()).for_each(|(&i, x)| direction[i] = -x);
+    }
+    let gain = direction.dot(&(&information * &direction));
+    if gain.is_nan() || gain <= ROUNDING * direction.dot(&(&gram * &direction)) {
+        return None;
+    }
+    // What noise alone would gain by so many coefficients is lost again on held-out data.
+    let price = select::cost(problem, &with) - select::cost(problem, &others) + own.len() as f64;
+    let doubt = (2.0 * select::STANDARD_ERRORS).powi(2);
+    let paid = (price.max(doubt) / gain).sqrt();
+    let moved = problem.contribution(&own, direction.as_slice());
+    let ratios = moved.iter().enumerate().map(|(j, moved)| select::least_moved(problem, &with, c, j) / moved);
+    Some(paid.max(ratios.fold(f64::INFINITY, f64::min)))
+}
+
+/// The part of some columns' inner products that others explain.
+fn explained(problem: &Problem, base: &[usize], own: &[usize]) -> DMatrix<f64> {
+    let mut inner = problem.gram(base, base);
+    for i in 0..base.len() {
+        inner[(i, i)] = inner[(i, i)] * (1.0 + ROUNDING) + f64::MIN_POSITIVE.sqrt();
+    }
+    let cross = problem.gram(base, own);
+    let nothing = DMatrix::zeros(own.len(), own.len());
+    inner.cholesky().map_or(nothing, |factor| cross.tr_mul(&factor.solve(&cross)))
+}

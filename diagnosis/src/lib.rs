@@ -18,6 +18,7 @@ mod floor;
 mod gap;
 mod horizon;
 mod kernel;
+mod learner;
 mod problem;
 mod refine;
 mod regimes;

@@ -788,12 +788,14 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
     for alternative in json["alternatives"].as_array().unwrap() {
         assert_keys(alternative, &["effects", "probability"], &[]);
     }
-    assert_keys(&json["unexplained"], &["fraction", "regimes"], &[]);
+    assert_keys(&json["unexplained"], &["fraction", "regimes"], &["learnable"]);
+    assert!((0.0..=1.0).contains(&json["unexplained"]["learnable"].as_f64().unwrap()));
     assert_keys(&json["shrink"], &["torque", "one_step", "rollout", "reference"], &[]);
     assert_change(&json["shrink"]["torque"], &[]);
     assert_change(&json["shrink"]["one_step"], &[]);
     json["shrink"]["rollout"].as_array().unwrap().iter().for_each(|change| assert_change(change, &["horizon"]));
     assert_keys(&json["shrink"]["reference"], &["noise_floor", "residual_network", "pure_network"], &[]);
+    assert!(["residual_network", "pure_network"].iter().all(|name| json["shrink"]["reference"][name].is_f64()));
     assert!(json["next_experiment"].is_null() || keys(&json["next_experiment"]) == ["motion", "separates", "why"]);
 
     let back: Diagnosis = serde_json::from_str(&text).unwrap();

@@ -213,9 +213,10 @@ pub struct Alternative {
 pub struct Unexplained {
     /// Squared gap left above the floor over the squared gap before.
     pub fraction: f64,
-    /// Part of the squared gap left above the floor that a network predicts on held-out data from (q, q̇, q̈) of all joints
-    /// at the moment, 0 to 1: near one, an effect is missing; near zero with much left, what is left hangs on time or on
-    /// what came before, or is noise. 0 where nothing is left above the floor.
+    /// Part of the squared gap left above the floor that a network predicts on held-out half seconds from (q, q̇, q̈) of all
+    /// joints at the moment, 0 to 1. Much says that an effect is missing; little does not say that none is: a rub at one
+    /// spot is little to a network, and what hangs on time or on what came before is nothing to it. 0 where nothing is left
+    /// above the floor.
     #[serde(default)]
     pub learnable: f64,
     /// Where it sits.

@@ -111,12 +111,9 @@ const LEARNED: f64 = 0.1;
 /// What a network still finds in what is left, in a sentence.
 pub fn learnable(left: &Unexplained) -> String {
     if left.learnable < LEARNED {
-        return "A network finds no more in what is left: it does not hang on the motion of the moment.".into();
+        return "A network finds next to nothing in what is left.".into();
     }
-    format!(
-        "A network can still predict {} of what is left: it hangs on the motion of the moment.",
-        percent(left.learnable)
-    )
+    format!("A network can still predict {} of what is left from the motion of the moment.", percent(left.learnable))
 }
 
 /// Why the list of effects is empty.

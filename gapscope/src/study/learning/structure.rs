@@ -9,6 +9,7 @@ use gapscope_dynamics::{Discrete, Integrator, Model, StepModel, Transitions, rob
 use gapscope_effects::Plant;
 use gapscope_residual::StepFn;
 use rayon::prelude::*;
+use std::fmt::Write;
 
 pub const NAME: &str = "structure";
 const SAMPLES: [usize; 6] = [100, 300, 1000, 3000, 10_000, 30_000];
@@ -136,14 +137,21 @@ pub fn run(budget: &Budget) -> Result<Findings> {
     })
 }
 
-/// Where the pure network's error falls below the residual's for good, in words.
+/// Which of the two is ahead, from which number of samples on, in words.
 fn overtaken(pure: &[f64], residual: &[f64]) -> String {
-    let figures = |k: usize| format!("{:.2e} against {:.2e} rad/s", pure[k], residual[k]);
-    let last = SAMPLES.len() - 1;
-    match (0..=last).rev().take_while(|&k| pure[k] < residual[k]).last() {
-        Some(k) => format!("the pure network overtakes it at N = {} ({})", SAMPLES[k], figures(k)),
-        None => format!("the pure network does not overtake it up to N = {} ({})", SAMPLES[last], figures(last)),
+    let pure_leads = |k: usize| pure[k] < residual[k];
+    let mut text = format!("at N = {} the {} ahead", SAMPLES[0], leader(pure_leads(0)));
+    for k in (1..SAMPLES.len()).filter(|&k| pure_leads(k) != pure_leads(k - 1)) {
+        let _ = write!(text, ", from N = {} on the {}", SAMPLES[k], leader(pure_leads(k)));
     }
+    let last = SAMPLES.len() - 1;
+    let _ =
+        write!(text, "; at N = {} pure has {:.2e}, residual {:.2e} rad/s", SAMPLES[last], pure[last], residual[last]);
+    text
+}
+
+fn leader(pure: bool) -> &'static str {
+    if pure { "pure network is" } else { "residual is" }
 }
 
 #[cfg(test)]
@@ -161,9 +169,14 @@ mod tests {
     }
 
     #[test]
-    fn to_overtake_is_to_stay_ahead() {
+    fn who_is_ahead_and_from_where() {
         let residual = [3.0; SAMPLES.len()];
-        assert!(overtaken(&[9.0, 1.0, 9.0, 1.0, 1.0, 1.0], &residual).contains("N = 3000 "));
-        assert!(overtaken(&[1.0, 1.0, 1.0, 1.0, 1.0, 9.0], &residual).contains("does not"));
+        let text = overtaken(&[9.0, 9.0, 9.0, 1.0, 1.0, 1.0], &residual);
+        assert!(
+            text.starts_with("at N = 100 the residual is ahead, from N = 3000 on the pure network is; at"),
+            "{text}"
+        );
+        let text = overtaken(&[1.0; SAMPLES.len()], &residual);
+        assert!(text.starts_with("at N = 100 the pure network is ahead; at N = 30000"), "{text}");
     }
 }

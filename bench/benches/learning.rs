@@ -4,7 +4,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use gapscope_dynamics::{Discrete, Integrator, Model, StepModel};
 use gapscope_network::{Activation, Adam, AdamSettings, Init, Loss, LossPass, Mlp, Net, Real};
-use gapscope_residual::{Alarm, Hybrid, On, explained_share};
+use gapscope_residual::{Hybrid, On, RandomFeatures, explained_share};
 use std::hint::black_box;
 
 const SIZES: [usize; 4] = [21, 128, 128, 14];
@@ -89,12 +89,15 @@ fn training(c: &mut Criterion) {
 
 /// The alarm of the diagnosis: 2000 rows of q, v, a of seven joints in five folds.
 fn alarm(c: &mut Criterion) {
-    let (features, targets) = (numbers(2000 * 21, 0.1), numbers(2000 * 7, 0.4));
+    let (inputs, targets) = (numbers(2000 * 21, 0.1), numbers(2000 * 7, 0.4));
     let folds: Vec<usize> = (0..2000).map(|i| i / 400).collect();
     let mut group = c.benchmark_group("explained_share");
     group.sample_size(10);
     group.bench_function("2000 x 7", |b| {
-        b.iter(|| explained_share(black_box(&features), &targets, &folds, None, &Alarm::default()).unwrap())
+        b.iter(|| {
+            let features = RandomFeatures::draw(black_box(&inputs), 21, RandomFeatures::NEURONS, 0).apply(&inputs);
+            explained_share(&features, &targets, &folds, None, None).unwrap()
+        })
     });
     group.finish();
 }

@@ -10,6 +10,7 @@ use crate::experiment;
 use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
 use crate::horizon::{self, Errors};
+use crate::learner;
 use crate::power;
 use crate::problem::{Problem, Term};
 use crate::refine::Data;
@@ -543,6 +544,9 @@ impl Logs<'_> {
         let floor_rms = gap::weighted_rms(&floor.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &weights);
         let torque = gap::change(&squares(&before.rows), &squares(&after.rows), &weights, floor_rms);
         let (one_step, rollout) = before.errors.change(&after.errors, &weights);
+        progress("networks", 0.95);
+        let learned = learner::learn(&self.signals, &self.band, &weights, &before.rows, &after.rows);
+        let learnable = learned.map_or(0.0, |l| l.learnable(floor_rms));
         // No hand pushes twice alike: what is left while nothing pushes is what a verdict hangs on.
         let calm = |i: usize| {
             let row = &self.band.rows[i];
@@ -601,12 +605,16 @@ impl Logs<'_> {
             power: power::power(model, &chosen.all, &chosen.choice.set),
             effects: found,
             alternatives: alternatives(&chosen.all, rivals),
-            unexplained: Unexplained { fraction: unexplained, regimes: left },
+            unexplained: Unexplained { fraction: unexplained, learnable, regimes: left },
             shrink: Shrink {
                 torque,
                 one_step,
                 rollout,
-                reference: Reference { noise_floor: floor_rms, residual_network: None, pure_network: None },
+                reference: Reference {
+                    noise_floor: floor_rms,
+                    residual_network: learned.map(|l| l.residual_network),
+                    pure_network: learned.map(|l| l.pure_network),
+                },
             },
         };
         progress("done", 1.0);
@@ -676,7 +684,7 @@ impl Logs<'_> {
             },
             effects: Vec::new(),
             alternatives: Vec::new(),
-            unexplained: Unexplained { fraction: 0.0, regimes: Vec::new() },
+            unexplained: Unexplained { fraction: 0.0, learnable: 0.0, regimes: Vec::new() },
             shrink: Shrink {
                 torque: nothing(),
                 one_step: nothing(),

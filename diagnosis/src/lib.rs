@@ -20,6 +20,7 @@ mod floor;
 mod gap;
 mod horizon;
 mod kernel;
+mod learner;
 mod power;
 mod problem;
 mod refine;

@@ -232,6 +232,12 @@ pub struct Alternative {
 pub struct Unexplained {
     /// Squared gap left above the floor over the squared gap before.
     pub fraction: f64,
+    /// Part of the squared gap left above the floor that a network predicts on held-out half seconds from (q, q̇, q̈) of all
+    /// joints at the moment, 0 to 1. Much says that an effect is missing; little does not say that none is: a rub at one
+    /// spot is little to a network, and what hangs on time or on what came before is nothing to it. 0 where nothing is left
+    /// above the floor.
+    #[serde(default)]
+    pub learnable: f64,
     /// Where it sits.
     pub regimes: Vec<Regime>,
 }
@@ -284,9 +290,9 @@ pub struct HorizonChange {
 pub struct Reference {
     /// What noise alone gives.
     pub noise_floor: f64,
-    /// A residual network on top of the nominal model; `None` where it was not trained.
+    /// A residual network on top of the nominal model, held out; `None` where it was not trained.
     pub residual_network: Option<f64>,
-    /// A pure network; `None` where it was not trained.
+    /// A network alone, (q, q̇, q̈) to torque, held out; `None` where it was not trained.
     pub pure_network: Option<f64>,
 }
 

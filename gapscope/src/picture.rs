@@ -4,9 +4,12 @@ use crate::report::axis::Axis;
 use maud::{Markup, PreEscaped, html};
 use std::fmt::Write;
 
-/// Width and height of the file, and of the frame's margins: left, top, right, bottom.
-const SIZE: [f64; 2] = [720.0, 400.0];
-const MARGIN: [f64; 4] = [70.0, 64.0, 24.0, 52.0];
+/// Width of the file, height of the frame in it, and its margins: left, right, bottom. The legend is above it.
+const WIDTH: f64 = 720.0;
+const DOWN: f64 = 290.0;
+const MARGIN: [f64; 3] = [70.0, 24.0, 52.0];
+/// First line of the legend, distance of its lines, width of a key, and of a character at most.
+const LEGEND: [f64; 4] = [44.0, 18.0, 20.0, 7.2];
 
 const STYLE: &str = "svg{background:#fff;color:#16191d;font:13px system-ui,sans-serif}\
 .grid{stroke:#e4e7ea}.title{font-weight:600;font-size:15px}.muted{fill:#5b636d}text{fill:currentColor}\
@@ -29,9 +32,16 @@ pub struct Series {
 
 /// A plot as the text of an SVG file. Colours follow the order of the series.
 pub fn svg(title: &str, x: &Axis, y: &Axis, series: &[Series]) -> String {
-    let [width, height] = SIZE;
-    let [left, top, right, bottom] = MARGIN;
-    let (across, down) = (width - left - right, height - top - bottom);
+    let [left, right, bottom] = MARGIN;
+    let across = WIDTH - left - right;
+    // As many columns as the longest name allows.
+    let longest = series.iter().map(|one| one.name.chars().count()).max().unwrap_or(0);
+    let columns = ((across / (LEGEND[2] + LEGEND[3] * (longest + 2) as f64)) as usize).clamp(1, 4);
+    let legend = |i: usize| {
+        (left + across / columns as f64 * (i % columns) as f64, LEGEND[0] + LEGEND[1] * (i / columns) as f64)
+    };
+    let top = legend(series.len().saturating_sub(1)).1 + 14.0;
+    let (width, height, down) = (WIDTH, top + DOWN + bottom, DOWN);
     let place = |[h, v]: [f64; 2]| (left + across * x.place(h), top + down * (1.0 - y.place(v)));
     let path = |points: &[[f64; 2]]| {
         let mut text = String::new();
@@ -43,7 +53,6 @@ pub fn svg(title: &str, x: &Axis, y: &Axis, series: &[Series]) -> String {
         text
     };
     let number = |v: f64| format!("{v:.1}");
-    let legend = |i: usize| (left + across / 3.0 * (i % 3) as f64, 36.0 + 18.0 * (i / 3) as f64);
     let markup: Markup = html! {
         svg xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } role="img" {
             title { (title) }
@@ -72,7 +81,7 @@ pub fn svg(title: &str, x: &Axis, y: &Axis, series: &[Series]) -> String {
                     }
                     @let (h, v) = legend(i);
                     rect.key x=(number(h)) y=(number(v - 8.0)) width="14" height="8" rx="1" {}
-                    text x=(number(h + 20.0)) y=(number(v)) { (one.name) }
+                    text x=(number(h + LEGEND[2])) y=(number(v)) { (one.name) }
                 }
             }
         }

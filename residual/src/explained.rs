@@ -1,32 +1,15 @@
 //! The alarm: does anything learnable remain in what the physics left?
 //!
-//! A ridge regression on random tanh features, fitted on some folds and judged on the others: closed form, a fraction of
-//! a second for thousands of rows (random features: Rahimi and Recht, NIPS 2007).
+//! A ridge regression, fitted on some folds and judged on the others: closed form, a fraction of a second for thousands of
+//! rows of random features.
 
 use crate::error::ResidualError;
 use crate::orthogonal::coefficients;
 use crate::ridge::{cross, solve};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
-use gapscope_network::{Normal, ShapeError};
-use rand::{RngExt, SeedableRng};
-use rand_distr::StandardNormal;
-use rand_pcg::Pcg64;
-
-/// Settings of [`explained_share`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Alarm {
-    /// Random features, beside the inputs themselves, their squares and a constant.
-    pub neurons: usize,
-    /// Draws them.
-    pub seed: u64,
-}
-
-impl Default for Alarm {
-    fn default() -> Self {
-        Self { neurons: 384, seed: 0 }
-    }
-}
+use gapscope_network::ShapeError;
+use rayon::prelude::*;
 
 /// What [`explained_share`] found.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,25 +25,29 @@ pub struct Explained {
 
 /// Ridge strengths tried, relative to features of variance one.
 const STRENGTHS: [f64; 5] = [1e-5, 1e-3, 1e-1, 3.0, 300.0];
+/// The strength where there are too few folds to choose it by.
+const STRENGTH: usize = 2;
 
-/// How much of `targets`, `[rows][n]` (residual torques, say), a smooth function of `features`, `[rows][d]` (q, q̇, q̈ or
-/// their sines and cosines; any units), explains on rows it was not fitted to.
+/// How much of `targets`, `[rows][n]` (residual torques, say), a linear function of `features`, `[rows][h]`, explains on
+/// rows it was not fitted to. With [`RandomFeatures`](crate::RandomFeatures) of q, q̇, q̈: any smooth function.
 ///
 /// `folds` names the fold of each row: make them episodes or long blocks, so that rows of different folds do not share
-/// noise. Each fold is predicted from the others, the ridge strength chosen without it. Targets that differ in unit or
-/// size should be brought to comparable size by the caller: `share` adds their squares.
+/// noise; rows at the border of two, which do, can be predicted and kept from every fit (false in `trains`). Each fold is
+/// predicted from the others, the ridge strength of each target chosen without it. Targets that differ in unit or size
+/// should be brought to comparable size by the caller: `share` adds their squares.
 ///
 /// With `tangents`, `[rows · n][p]` (the regressor's rows, say), the physical parameters are fitted again on the training
 /// folds first, the rest is what counts as target, and the predictions lose their part in the tangents' span there: what
 /// is explained then is nothing that the physics could have explained.
 ///
 /// ```
-/// use gapscope_residual::{Alarm, explained_share};
+/// use gapscope_residual::{RandomFeatures, explained_share};
 ///
-/// let features: Vec<f64> = (0..900).map(|i| (1.7 * f64::from(i)).sin()).collect();
+/// let inputs: Vec<f64> = (0..900).map(|i| (1.7 * f64::from(i)).sin()).collect();
 /// let folds: Vec<usize> = (0..300).map(|i| i / 60).collect();
-/// let targets: Vec<f64> = features.chunks(3).map(|x| x[0] * x[1]).collect();
-/// let found = explained_share(&features, &targets, &folds, None, &Alarm::default())?;
+/// let targets: Vec<f64> = inputs.chunks(3).map(|x| x[0] * x[1]).collect();
+/// let features = RandomFeatures::draw(&inputs, 3, RandomFeatures::NEURONS, 0).apply(&inputs);
+/// let found = explained_share(&features, &targets, &folds, None, None)?;
 /// assert!(found.share > 0.9, "{}", found.share);
 /// # Ok::<(), gapscope_residual::ResidualError>(())
 /// ```
@@ -71,12 +58,15 @@ pub fn explained_share(
     features: &[f64],
     targets: &[f64],
     folds: &[usize],
+    trains: Option<&[bool]>,
     tangents: Option<&[f64]>,
-    alarm: &Alarm,
 ) -> Result<Explained, ResidualError> {
     let rows = folds.len();
-    let (width, n) = (columns("features", features, rows)?, columns("targets", targets, rows)?);
+    let (h, n) = (columns("features", features, rows)?, columns("targets", targets, rows)?);
     let p = tangents.map(|t| columns("tangents", t, rows * n)).transpose()?;
+    if let Some(trains) = trains.filter(|t| t.len() != rows) {
+        return Err(ShapeError::Data { what: "rows that train", rows, width: 1, found: trains.len() }.into());
+    }
     let mut names = folds.to_vec();
     names.sort_unstable();
     names.dedup();
@@ -84,38 +74,30 @@ pub fn explained_share(
         let mend = "the rows need two folds or more";
         return Err(ResidualError::Singular { what: "a share on held-out rows", mend });
     }
-    let hidden = random_features(features, width, alarm);
-    let h = hidden.len() / rows;
-    let parts: Vec<Vec<usize>> =
-        names.iter().map(|name| (0..rows).filter(|&row| folds[row] == *name).collect()).collect();
-    let select = |values: &[f64], part: &[usize], width: usize| -> Vec<f64> {
-        part.iter().flat_map(|&row| &values[row * width..(row + 1) * width]).copied().collect()
-    };
-    let blocks: Vec<Vec<f64>> = parts.iter().map(|part| select(&hidden, part, h)).collect();
-    let phi: Option<Vec<Vec<f64>>> =
-        tangents.zip(p).map(|(t, p)| parts.iter().map(|part| select(t, part, n * p)).collect());
-    let grams: Vec<Mat<f64>> = blocks.iter().zip(&parts).map(|(f, part)| cross(f, f, part.len())).collect();
+    let trains = |row: usize| trains.is_none_or(|t| t[row]);
+    let parts: Vec<Part> = names
+        .iter()
+        .map(|name| {
+            let (mut rows, others): (Vec<usize>, Vec<usize>) =
+                (0..rows).filter(|&row| folds[row] == *name).partition(|&row| trains(row));
+            let used = rows.len();
+            rows.extend(others);
+            let pick = |values: &[f64], width: usize| -> Vec<f64> {
+                rows.iter().flat_map(|&row| &values[row * width..(row + 1) * width]).copied().collect()
+            };
+            let (features, targets) = (pick(features, h), pick(targets, n));
+            let tangents = tangents.zip(p).map_or_else(Vec::new, |(t, p)| pick(t, n * p));
+            let gram = cross(&features[..used * h], &features[..used * h], used);
+            Part { rows, used, features, targets, tangents, gram }
+        })
+        .collect();
+    let folds = (0..parts.len()).into_par_iter().map(|k| fold(&parts, k, n)).collect::<Vec<_>>();
     let mut prediction = vec![0.0; targets.len()];
     let (mut before, mut after) = (vec![0.0; n], vec![0.0; n]);
-    for k in 0..parts.len() {
-        // What the physics leaves once fitted on the other folds.
-        let own: Vec<Vec<f64>> = parts.iter().map(|part| select(targets, part, n)).collect();
-        let rest = match &phi {
-            Some(phi) => subtract(&own, phi, &projection(&own, phi, k)),
-            None => own,
-        };
-        let moments: Vec<Mat<f64>> = (0..parts.len()).map(|m| cross(&blocks[m], &rest[m], parts[m].len())).collect();
-        let Some(weights) = fit(k, &parts, &grams, &moments, &rest) else { continue };
-        let output = match &phi {
-            Some(phi) => {
-                let all: Vec<Vec<f64>> = blocks.iter().map(|f| apply(f, &weights)).collect();
-                subtract(&all, phi, &projection(&all, phi, k)).swap_remove(k)
-            }
-            None => apply(&blocks[k], &weights),
-        };
-        for (i, &row) in parts[k].iter().enumerate() {
+    for (part, [rest, output]) in parts.iter().zip(&folds) {
+        for (i, &row) in part.rows.iter().enumerate() {
             for j in 0..n {
-                let (target, output) = (rest[k][i * n + j], output[i * n + j]);
+                let (target, output) = (rest[i * n + j], output[i * n + j]);
                 prediction[row * n + j] = output;
                 before[j] += target * target;
                 after[j] += (target - output) * (target - output);
@@ -130,6 +112,28 @@ pub fn explained_share(
     })
 }
 
+/// The rows of a fold, those that train first.
+struct Part {
+    rows: Vec<usize>,
+    /// How many train.
+    used: usize,
+    /// `[rows][h]`.
+    features: Vec<f64>,
+    /// `[rows][n]`.
+    targets: Vec<f64>,
+    /// `[rows · n][p]`, or empty.
+    tangents: Vec<f64>,
+    /// FᵀF of the rows that train.
+    gram: Mat<f64>,
+}
+
+impl Part {
+    /// The part of `values` that trains, of rows of `width` numbers.
+    fn used<'a>(&self, values: &'a [f64], width: usize) -> &'a [f64] {
+        &values[..self.used * width]
+    }
+}
+
 fn columns(what: &'static str, values: &[f64], rows: usize) -> Result<usize, ResidualError> {
     let width = values.len() / rows.max(1);
     if width == 0 || values.len() != rows * width {
@@ -138,85 +142,86 @@ fn columns(what: &'static str, values: &[f64], rows: usize) -> Result<usize, Res
     Ok(width)
 }
 
-/// `[rows][1 + 2 width + neurons]`: a constant, the normalised inputs and their squares, and tanh(a · x + b). Half of the
-/// neurons look at one input alone, as friction and springs do, a quarter at two, a quarter at all.
-fn random_features(features: &[f64], width: usize, alarm: &Alarm) -> Vec<f64> {
-    let normal = Normal::of(features, width);
-    let rows: Vec<f64> = normal.apply(features);
-    let mut random = Pcg64::seed_from_u64(alarm.seed);
-    let neurons: Vec<(Vec<(usize, f64)>, f64)> = (0..alarm.neurons)
-        .map(|i| {
-            let mut draw = || random.sample::<f64, _>(StandardNormal);
-            if i % 2 == 0 {
-                // In turn, so that every input has its share: steps of friction at zero, the others anywhere.
-                let (j, kind) = ((i / 2) % width, (i / (2 * width)) % 6);
-                let slope = [40.0, 10.0, 3.0, 1.0, 1.0, 0.5][kind];
-                let centre = if kind < 2 { -normal.mean[j] / normal.scale[j] } else { draw() };
-                return (vec![(j, slope)], -slope * centre);
-            }
-            let offset = draw();
-            let inputs: Vec<usize> = match i % 4 {
-                1 => (0..2).map(|_| random.random_range(0..width)).collect(),
-                _ => (0..width).collect(),
-            };
-            let size = 1.5 / (inputs.len() as f64).sqrt();
-            let slopes = inputs.into_iter().map(|j| (j, size * random.sample::<f64, _>(StandardNormal)));
-            (slopes.collect(), offset)
+/// What counts as target in fold `k` and what the others predict of it, `[rows][n]` each.
+fn fold(parts: &[Part], k: usize, n: usize) -> [Vec<f64>; 2] {
+    // What the physics leaves once fitted on the other folds.
+    let own: Vec<Vec<f64>> = parts.iter().map(|part| part.targets.clone()).collect();
+    let mut rest = without_tangents(parts, own, k, n);
+    let moments: Vec<Mat<f64>> = parts
+        .iter()
+        .zip(&rest)
+        .map(|(part, rest)| {
+            let h = part.gram.nrows();
+            cross(part.used(&part.features, h), part.used(rest, n), part.used)
         })
         .collect();
-    let mut out = Vec::with_capacity(rows.len() / width * (1 + 2 * width + alarm.neurons));
-    for row in rows.chunks_exact(width) {
-        out.push(1.0);
-        out.extend_from_slice(row);
-        out.extend(row.iter().map(|x| x * x));
-        let sum = |(slopes, b): &(Vec<(usize, f64)>, f64)| slopes.iter().map(|&(j, a)| a * row[j]).sum::<f64>() + b;
-        out.extend(neurons.iter().map(|neuron| sum(neuron).tanh()));
-    }
-    out
+    let output = match fit(k, parts, &moments, &rest) {
+        Some(weights) => {
+            let all = parts.iter().map(|part| apply(&part.features, &weights)).collect();
+            without_tangents(parts, all, k, n).swap_remove(k)
+        }
+        None => vec![0.0; rest[k].len()],
+    };
+    [rest.swap_remove(k), output]
 }
 
-/// Weights from all folds but `k`, with the strength that predicts the other folds best, one at a time, `k` aside.
-fn fit(
-    k: usize,
-    parts: &[Vec<usize>],
-    grams: &[Mat<f64>],
-    moments: &[Mat<f64>],
-    rest: &[Vec<f64>],
-) -> Option<Mat<f64>> {
-    let without = |left_out: &[usize]| {
-        let used = || (0..parts.len()).filter(|m| !left_out.contains(m));
-        let sum =
-            |mats: &[Mat<f64>]| used().fold(Mat::zeros(mats[0].nrows(), mats[0].ncols()), |sum, m| sum + &mats[m]);
-        let rows: usize = used().map(|m| parts[m].len()).sum();
-        (sum(grams), sum(moments), rows)
+/// Weights from all folds but `k`, `[h][n]`, each target with the strength that predicts the other folds best, one at a
+/// time, `k` aside.
+fn fit(k: usize, parts: &[Part], moments: &[Mat<f64>], rest: &[Vec<f64>]) -> Option<Mat<f64>> {
+    let (h, n) = (moments[k].nrows(), moments[k].ncols());
+    let without = |left_out: [usize; 2]| {
+        let mut sums = (Mat::zeros(h, h), Mat::zeros(h, n), 0);
+        for m in (0..parts.len()).filter(|m| !left_out.contains(m)) {
+            sums.0 += &parts[m].gram;
+            sums.1 += &moments[m];
+            sums.2 += parts[m].used;
+        }
+        sums
     };
-    let inner: Vec<usize> = (0..parts.len()).filter(|&m| m != k).collect();
-    let mut best = (f64::INFINITY, STRENGTHS[STRENGTHS.len() - 1]);
-    if inner.len() > 1 {
-        // A few of the folds tell the strength; all of them would take their square of time.
-        let judges: Vec<_> = inner.iter().take(2).map(|&m| (m, without(&[k, m]))).collect();
-        for strength in STRENGTHS {
-            let error: f64 = judges
-                .iter()
-                .map(|(m, (gram, moment, rows))| match solve(gram, moment, *rows, 0.0, strength) {
-                    Some(w) => {
-                        let quadratic = w.transpose() * (&grams[*m] * &w);
-                        let linear = w.transpose() * &moments[*m];
-                        let trace = |a: &Mat<f64>| (0..a.nrows()).map(|i| a[(i, i)]).sum::<f64>();
-                        rest[*m].iter().map(|t| t * t).sum::<f64>() + trace(&quadratic) - 2.0 * trace(&linear)
-                    }
-                    None => f64::INFINITY,
-                })
-                .sum();
-            if error < best.0 {
-                best = (error, strength);
+    // A few of the folds tell the strength; all of them would take their square of time.
+    let judges: Vec<usize> = (0..parts.len()).filter(|&m| m != k).take(2).collect();
+    let mut best = vec![(f64::INFINITY, STRENGTH); n];
+    if parts.len() > 2 {
+        let mut errors = vec![vec![0.0; n]; STRENGTHS.len()];
+        for &m in &judges {
+            let (gram, moment, rows) = without([k, m]);
+            for (strength, errors) in STRENGTHS.into_iter().zip(&mut errors) {
+                let weights = solve(&gram, &moment, rows, 0.0, strength);
+                let image = weights.as_ref().map(|w| &parts[m].gram * w);
+                for (j, error) in errors.iter_mut().enumerate() {
+                    // ‖t − F w‖² = ‖t‖² + wᵀ FᵀF w − 2 wᵀ Fᵀt.
+                    *error += match weights.as_ref().zip(image.as_ref()) {
+                        Some((w, image)) => {
+                            let of = |i: usize| w[(i, j)] * (image[(i, j)] - 2.0 * moments[m][(i, j)]);
+                            let used = parts[m].used(&rest[m], n);
+                            used.iter().skip(j).step_by(n).map(|t| t * t).sum::<f64>() + (0..h).map(of).sum::<f64>()
+                        }
+                        None => f64::INFINITY,
+                    };
+                }
             }
         }
-    } else {
-        best.1 = 1e-2;
+        for (s, errors) in errors.iter().enumerate() {
+            for (best, error) in best.iter_mut().zip(errors) {
+                if *error < best.0 {
+                    *best = (*error, s);
+                }
+            }
+        }
     }
-    let (gram, moment, rows) = without(&[k]);
-    solve(&gram, &moment, rows, 0.0, best.1)
+    let (gram, moment, rows) = without([k, k]);
+    let mut weights = Mat::zeros(h, n);
+    for (s, strength) in STRENGTHS.into_iter().enumerate() {
+        let own: Vec<usize> = (0..n).filter(|&j| best[j].1 == s).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let solution = solve(&gram, &Mat::from_fn(h, own.len(), |i, j| moment[(i, own[j])]), rows, 0.0, strength)?;
+        for (from, &to) in own.iter().enumerate() {
+            weights.col_mut(to).copy_from(solution.col(from));
+        }
+    }
+    Some(weights)
 }
 
 /// F W, `[rows][n]`.
@@ -229,21 +234,24 @@ fn apply(features: &[f64], weights: &Mat<f64>) -> Vec<f64> {
     out
 }
 
-/// Coefficients of the tangents in `values`, from all folds but `k`.
-fn projection(values: &[Vec<f64>], phi: &[Vec<f64>], k: usize) -> Vec<f64> {
-    let others = || (0..phi.len()).filter(|&m| m != k && !values[m].is_empty());
-    let p = others().map(|m| phi[m].len() / values[m].len()).next().unwrap_or(0);
-    let sum = |of: &dyn Fn(usize) -> Mat<f64>, columns: usize| others().fold(Mat::zeros(p, columns), |s, m| s + of(m));
-    let gram = sum(&|m| cross(&phi[m], &phi[m], values[m].len()), p);
-    let moment = sum(&|m| cross(&phi[m], &values[m], values[m].len()), 1);
-    coefficients(&gram, &moment)
-}
-
-/// values − Φ c, fold by fold.
-fn subtract(values: &[Vec<f64>], phi: &[Vec<f64>], c: &[f64]) -> Vec<Vec<f64>> {
-    let one = |(values, phi): (&Vec<f64>, &Vec<f64>)| {
-        let pairs = values.iter().zip(phi.chunks_exact(c.len()));
-        pairs.map(|(value, row)| value - row.iter().zip(c).map(|(phi, c)| phi * c).sum::<f64>()).collect()
-    };
-    values.iter().zip(phi).map(one).collect()
+/// Values of every fold, `[rows][n]`, less what the tangents explain of them with coefficients from all folds but `k`; as
+/// they are where there are no tangents.
+fn without_tangents(parts: &[Part], mut values: Vec<Vec<f64>>, k: usize, n: usize) -> Vec<Vec<f64>> {
+    let p = parts[k].tangents.len() / values[k].len().max(1);
+    if p == 0 {
+        return values;
+    }
+    let (mut gram, mut moment) = (Mat::zeros(p, p), Mat::zeros(p, 1));
+    for (m, part) in parts.iter().enumerate().filter(|(m, _)| *m != k) {
+        let phi = part.used(&part.tangents, n * p);
+        gram += cross(phi, phi, part.used * n);
+        moment += cross(phi, part.used(&values[m], n), part.used * n);
+    }
+    let c = coefficients(&gram, &moment);
+    for (part, values) in parts.iter().zip(&mut values) {
+        for (value, row) in values.iter_mut().zip(part.tangents.chunks_exact(p)) {
+            *value -= row.iter().zip(&c).map(|(phi, c)| phi * c).sum::<f64>();
+        }
+    }
+    values
 }

@@ -3,8 +3,8 @@
 //!
 //! [`learn`] trains r_θ to minimise (1/N) Σ ‖x⁺ − f_phys(x, τ) − r_θ(x, τ)‖² + λ (1/N) Σ ‖r_θ‖²; [`Hybrid`] is f_hyb, a
 //! [`StepModel`](gapscope_dynamics::StepModel) itself; [`Continuous`] adds r_θ to ẋ instead. [`ridge`] is the closed form
-//! on features, [`Tangents`] keeps a correction from what physics can explain, and [`explained_share`] asks quickly
-//! whether anything is left to learn.
+//! on features, [`Tangents`] keeps a correction from what physics can explain, and [`explained_share`] asks quickly,
+//! on [`RandomFeatures`], whether anything is left to learn.
 //!
 //! Minimising over all functions, the best r_θ is E[x⁺ − f_phys | x, τ] / (1 + λ): the conditional mean of the error,
 //! shrunk. (Expand the square and set the derivative for each (x, τ) to zero.)
@@ -13,6 +13,7 @@
 mod continuous;
 mod error;
 mod explained;
+mod features;
 mod hybrid;
 mod learn;
 mod orthogonal;
@@ -21,7 +22,8 @@ mod step_fn;
 
 pub use continuous::{Continuous, Scheme, rigid_rate};
 pub use error::ResidualError;
-pub use explained::{Alarm, Explained, explained_share};
+pub use explained::{Explained, explained_share};
+pub use features::RandomFeatures;
 pub use hybrid::{Hybrid, On};
 pub use learn::{examples, learn};
 pub use orthogonal::{Orthogonal, Tangents};

@@ -144,6 +144,23 @@ fn a_learned_residual_shrinks_the_one_step_error_of_states_not_seen() {
         };
         let before = rms(&mut physics);
         let trained = learn::<f64>(&mut physics, &train, Some(&test), on, &learner, None, &mut |_| {}).unwrap();
+        if on == On::Acceleration {
+            // The same correction in continuous time, added to v̇.
+            let net = Net::new(trained.network.clone());
+            for scheme in [Scheme::Rk4, Scheme::Adaptive { tolerance: 1e-8 }] {
+                let mut bare = Continuous::new(
+                    2,
+                    DT,
+                    rigid_rate(model.clone()),
+                    Formula { shape: [6, 2], formula: |_: &[f64], r: &mut [f64]| r.fill(0.0) },
+                    scheme,
+                )
+                .unwrap();
+                let mut model = Continuous::new(2, DT, rigid_rate(model.clone()), net.clone(), scheme).unwrap();
+                let (before, after) = (rms(&mut bare), rms(&mut model));
+                assert!(after < 0.5 * before, "{scheme:?}: {before} → {after}");
+            }
+        }
         let after = rms(&mut Hybrid::new(physics, Net::new(trained.network), on).unwrap());
         assert!(after < 0.15 * before, "{on:?}: {before} → {after}");
     }

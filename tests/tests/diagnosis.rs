@@ -788,7 +788,8 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
     for alternative in json["alternatives"].as_array().unwrap() {
         assert_keys(alternative, &["effects", "probability"], &[]);
     }
-    assert_keys(&json["unexplained"], &["fraction", "regimes"], &[]);
+    assert_keys(&json["unexplained"], &["fraction", "regimes"], &["learnable"]);
+    assert!((0.0..=1.0).contains(&json["unexplained"]["learnable"].as_f64().unwrap()));
     assert_keys(&json["shrink"], &["torque", "one_step", "rollout", "reference"], &[]);
     assert_change(&json["shrink"]["torque"], &[]);
     assert_change(&json["shrink"]["one_step"], &[]);
@@ -802,6 +803,7 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
     for power in json["power"].as_array().unwrap() {
         assert_keys(power, &["kind", "joints", "parameter", "size", "unit"], &[]);
     }
+    assert!(["residual_network", "pure_network"].iter().all(|name| json["shrink"]["reference"][name].is_f64()));
 
     let back: Diagnosis = serde_json::from_str(&text).unwrap();
     assert_eq!(back, outcome.diagnosis, "read back to the bit");

@@ -36,7 +36,8 @@ pub use power::line as power_line;
 pub use rollout::page as rollout_page;
 pub use score::html as score;
 pub use words::{
-    capital, effect, implied_unit, interval, joints as joint_list, motion_unit, outstanding, regime, said_of, verdict,
+    capital, effect, implied_unit, interval, joints as joint_list, learnable, motion_unit, outstanding, regime,
+    said_of, verdict,
 };
 
 /// Colours, type and layout; light and dark, wide, narrow and print.

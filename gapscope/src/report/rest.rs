@@ -21,7 +21,8 @@ pub fn unexplained(diagnosis: &Diagnosis) -> Markup {
                     @if let Some(first) = outstanding.first() {
                         "; most clearly at " (first.joint) " " (words::regime_phrase(first)) ", with " (percent(first.share)) " of what is left there"
                     }
-                    "."
+                    ". "
+                    (words::learnable(left))
                 } @else {
                     "Nothing above the noise floor."
                 }

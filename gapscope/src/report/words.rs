@@ -1,7 +1,7 @@
 //! The catalogue, the verdicts and the regimes in words, and joint names made short.
 
-use super::format::{self, plain, with_unit};
-use gapscope_diagnosis::schema::{Bounds, Evidence, Regime, Verdict};
+use super::format::{self, percent, plain, with_unit};
+use gapscope_diagnosis::schema::{Bounds, Evidence, Regime, Unexplained, Verdict};
 
 /// An effect's public name in words, lower case but for names of people.
 pub fn effect(kind: &str) -> String {
@@ -103,6 +103,17 @@ pub fn verdict_meaning(verdict: Verdict) -> &'static str {
         Verdict::UnknownEffect => "There is a gap, and no effect that I know explains it.",
         Verdict::NotExcited => "The logs are too short or too still to tell.",
     }
+}
+
+/// Of what is left, a network must predict this part to be worth a line.
+const LEARNED: f64 = 0.1;
+
+/// What a network still finds in what is left, in a sentence.
+pub fn learnable(left: &Unexplained) -> String {
+    if left.learnable < LEARNED {
+        return "A network finds next to nothing in what is left.".into();
+    }
+    format!("A network can still predict {} of what is left from the motion of the moment.", percent(left.learnable))
 }
 
 /// Why the list of effects is empty.

@@ -99,6 +99,7 @@ fn csv(found: &Findings) -> String {
         let cells: Vec<String> = row
             .iter()
             .map(|cell| match cell {
+                Cell::Text(text) if text.contains(',') => format!("\"{text}\""),
                 Cell::Text(text) => text.clone(),
                 Cell::Figure(value) => value.to_string(),
             })

@@ -2,7 +2,8 @@
 
 use super::arm::{BOTH, Budget, DT, medians, model, random_steps, trained_errors, truth};
 use super::{Cell, Findings, Picture, measured};
-use crate::report::axis::Axis;
+use crate::picture::Series;
+use crate::report::axis::{Axis, extent};
 use crate::train::velocity_rms;
 use anyhow::Result;
 use gapscope_dynamics::Transitions;
@@ -40,7 +41,10 @@ pub fn run(budget: &Budget) -> Result<Findings> {
         })
         .collect();
     let line = |name: &str, values: &[f64]| measured(name, SCALES.iter().zip(values).map(|(s, e)| [*s, *e]).collect());
-    let series = vec![line("residual", &residual), line("pure", &pure), line("physics alone", &physics)];
+    let mut series = vec![line("residual", &residual), line("pure", &pure), line("physics alone", &physics)];
+    let (least, most) = extent(series.iter().flat_map(|s| &s.points).map(|p| p[1]));
+    let edge = vec![[1.0, least], [1.0, most]];
+    series.push(Series { name: "edge of the training region".into(), points: edge, dashed: true, dots: false });
     let (inside, outside) = (2, SCALES.len() - 1);
     let findings = vec![
         format!(

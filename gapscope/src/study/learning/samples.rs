@@ -58,11 +58,9 @@ pub fn run(budget: &Budget) -> Result<Findings> {
             row.extend(own.iter().map(|e| Cell::Figure(*e)));
             row.push(Cell::Text(format!("{slope:.2}")));
             rows.push(row);
-            // The pure network hardly sees the size of the mismatch: one line is enough.
+            // Of the pure network one line is enough, at the largest mismatch.
             if *opponent == Opponent::Residual || s == SIZES.len() - 1 {
-                let label =
-                    if *opponent == Opponent::Pure { "pure".into() } else { format!("residual, mismatch {size}") };
-                series.push(measured(format!("{label}: N^{slope:.2}"), points));
+                series.push(measured(format!("{name}, mismatch {size}: N^−{:.2}", -slope), points));
             }
         }
         let at = |o: usize, k: usize| errors[(2 * s + o) * SAMPLES.len() + k];

@@ -99,7 +99,11 @@ fn summary(robot: &str, models: &[ModelRollouts], options: &RolloutOptions) -> S
     text.push('\n');
     for model in models {
         let leaves = |t: f64| {
-            if t.is_finite() { format!("after {} s", plain(t)) } else { format!("not within {} s", plain(options.horizon)) }
+            if t.is_finite() {
+                format!("after {} s", plain(t))
+            } else {
+                format!("not within {} s", plain(options.horizon))
+            }
         };
         let rate = model.growth.rate.map_or("–".into(), figure);
         let quantiles = model.growth.leaves;

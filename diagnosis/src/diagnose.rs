@@ -349,13 +349,6 @@ impl Logs<'_> {
             let choice = select::evaluate(&best.all, set);
             let chosen = Chosen { all: best.all.clone(), choice, exact, fit, noise: best.noise.clone() };
             let typical = gap::typical(&squares(&chosen)?, &weights);
-            eprintln!(
-                "drive {:?} {:?} {:?} {:.3}: {typical:.4} of {least:.4}",
-                chosen.all.entries[c].candidate.kind,
-                chosen.all.entries[c].candidate.joints,
-                chosen.all.entries[c].candidate.side,
-                chosen.all.entries[c].candidate.shape
-            );
             if physical && typical < least {
                 least = BETTER * typical;
                 best = chosen;

@@ -46,7 +46,7 @@ const DECISIVE: f64 = 1.5;
 /// The same for a further joint of a kind that joints usually share.
 const SHARED_STANDARD_ERRORS: f64 = 0.5;
 /// And the part of the least torque of a new effect that it must move the joint by.
-const SHARED_SIZE: f64 = 0.5;
+const SHARED_SIZE: f64 = 1.0;
 /// Moves towards a rival: what explains the same does so soon.
 const RIVAL_MOVES: usize = 8;
 /// Moves of the local search, at most.

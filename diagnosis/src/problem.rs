@@ -21,7 +21,7 @@ const IMMATERIAL: f64 = 1e-3;
 const MATERIAL: f64 = 3.0;
 /// ... by this part of the noise, which many rows average out, and by all of what no candidate explains beyond the noise,
 /// which no number of rows averages out: with unknown effects of that size about, a smaller one cannot be named.
-const OF_NOISE: f64 = 0.2;
+pub const OF_NOISE: f64 = 0.2;
 /// Resonance of a link on its locked drive, Hz, below which no drive is built.
 const SOFTEST: f64 = 1.5;
 /// Eigenvalues of a candidate's normal equations below this part of the largest count as zero.

@@ -1,7 +1,7 @@
 //! Which candidates: best subset by local search on held-out deviance, then pruning by the one-standard-error rule.
 
 use crate::band::Band;
-use crate::problem::Problem;
+use crate::problem::{OF_NOISE, Problem};
 use gapscope_effects::{Candidate, Kind};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -46,7 +46,7 @@ const DECISIVE: f64 = 1.5;
 /// The same for a further joint of a kind that joints usually share.
 const SHARED_STANDARD_ERRORS: f64 = 0.5;
 /// And the part of the least torque of a new effect that it must move the joint by.
-const SHARED_SIZE: f64 = 1.0;
+const SHARED_SIZE: f64 = 0.5;
 /// Moves towards a rival: what explains the same does so soon.
 const RIVAL_MOVES: usize = 8;
 /// Moves of the local search, at most.
@@ -352,7 +352,7 @@ fn is_shared(problem: &Problem, set: &[usize], c: usize) -> bool {
 pub fn least_moved(problem: &Problem, set: &[usize], c: usize, joint: usize) -> f64 {
     let least = if is_shared(problem, set, c) { SHARED_SIZE } else { 1.0 } * problem.least[joint];
     let holds_noise = HOLD_NOISE.contains(&problem.entries[c].candidate.kind);
-    if holds_noise { least.max(OVER_NOISE * problem.noise[joint]) } else { least }
+    least.max(if holds_noise { OVER_NOISE } else { OF_NOISE } * problem.noise[joint])
 }
 
 /// Takes away, weakest first, what does not lower the held-out deviance beyond doubt or does not matter.

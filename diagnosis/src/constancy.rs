@@ -1,5 +1,6 @@
 //! Whether an effect is the same in every regime. A law holds slow and fast, here and there, early and late; what stands in
-//! for a law that the catalogue does not have holds only on average, and falls apart when it is fitted in halves.
+//! for a law that the catalogue does not have holds only on average, and falls apart when it is fitted to the slowest
+//! and the fastest third of the rows, the first and the last, either end of the range.
 
 use crate::band::Band;
 use crate::estimate::Fit;
@@ -73,4 +74,47 @@ fn apart(problem: &Problem, entry: usize, thirds: &[Fit; 2]) -> f64 {
     let size = |theta: &[f64]| problem.contribution(&columns, theta).iter().map(|x| x * x).sum::<f64>().sqrt();
     let greater = size(&own[0]).max(size(&own[1]));
     if greater > 0.0 { size(&difference) / greater } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::Term;
+    use crate::refine::Data;
+    use crate::signals::standstill;
+    use gapscope_datasets::{Recipe, generate};
+    use gapscope_dynamics::robots;
+
+    /// What falls apart of viscous friction fitted to a drag on the first joint of a double pendulum.
+    fn fitted_as_viscous(drag: impl Fn(f64) -> f64) -> Vec<(usize, f64)> {
+        let model = robots::model("double_pendulum").unwrap().unwrap().model;
+        let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
+        let signals: Vec<Signals> = (1..4)
+            .map(|seed| {
+                let mut s = Signals::new(&model, &generate(&model, &[], seed, &recipe, "log").unwrap()).unwrap();
+                let (tau, v) = (&mut s.tau[0], &s.v[0]);
+                tau.iter_mut().zip(v).for_each(|(tau, v)| *tau += drag(*v));
+                s
+            })
+            .collect();
+        let (band, still) = (Band::new(&signals), standstill(&signals, 2));
+        let data = Data {
+            model: &model,
+            signals: &signals,
+            band: &band,
+            standstill: &still,
+            moving: &[true; 2],
+            noise: &[1e-3; 2],
+        };
+        let term = Term { candidate: Candidate::new(Kind::ViscousFriction, vec![0]), tangent_at: None };
+        let problem = data.problem(vec![term], &Kind::ALL);
+        inconsistent(&problem, &Fit::on_all(&problem, &[0]), &signals, &band)
+    }
+
+    #[test]
+    fn a_law_holds_in_every_regime_and_its_substitute_does_not() {
+        assert_eq!(fitted_as_viscous(|v| 0.5 * v), []);
+        let apart = fitted_as_viscous(|v| 0.5 * v * v.abs());
+        assert!(apart.len() == 1 && apart[0].1 > 0.5, "{apart:?}");
+    }
 }

@@ -28,6 +28,7 @@ mod regimes;
 mod rollout;
 pub mod schema;
 mod screen;
+mod search;
 mod select;
 mod signals;
 mod verdict;

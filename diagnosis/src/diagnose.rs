@@ -6,7 +6,7 @@ use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
 use crate::estimate::Fit;
 use crate::evidence;
 use crate::experiment;
-use crate::floor::noise_floor;
+use crate::floor::{self, noise_floor};
 use crate::gap::{self, Rows};
 use crate::horizon::{self, Errors};
 use crate::learner;
@@ -154,7 +154,7 @@ impl Logs<'_> {
             .par_iter()
             .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
             .collect();
-        let noise = noise_floor(&self.signals, &self.band, &nominal, n);
+        let noise = noise_floor(&self.signals, &self.band, &nominal, n, 0.0);
         let mut candidates = Candidate::all(self.model);
         candidates.retain(|c| COMMON.contains(&c.kind));
         let terms = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
@@ -269,7 +269,7 @@ impl Logs<'_> {
                 ))
             })
             .collect::<Result<_, EffectError>>()?;
-        let floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof());
+        let floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof(), floor::lag(&effects));
         progress("intervals", 0.85);
         let everything = |_: usize| true;
         let squares = |rows: &Rows| gap::squares(&self.band, rows, everything);

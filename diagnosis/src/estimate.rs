@@ -2,6 +2,7 @@
 
 use crate::problem::Problem;
 use crate::schema::{Estimate, Parameter, Quantity};
+use crate::select::LATE;
 use gapscope_dynamics::{JointKind, Model};
 use gapscope_effects::{Effect, Kind, Value};
 use nalgebra::DMatrix;
@@ -11,6 +12,8 @@ use std::collections::BTreeMap;
 /// What sampling, integration and the laws themselves leave of any parameter, as a part of it; no number of rows averages
 /// that out.
 const SYSTEMATIC: f64 = 3e-3;
+/// When an effort acts within its sample, loggers and simulators do not say to better than this part of a sample.
+const TIMING: f64 = 0.2;
 /// Step of the numerical derivative from coefficients to parameters, in standard errors.
 const STEP: f64 = 1e-3;
 
@@ -127,7 +130,8 @@ impl Fit {
                             .flat_map(|i| (0..at.len()).map(move |k| (i, k)))
                             .map(|(i, k)| gradient[i] * own[(i, k)] * gradient[k])
                             .sum();
-                        (quantile * variance.max(0.0).sqrt()).hypot(SYSTEMATIC * size)
+                        let timing = if LATE.contains(&kind) { TIMING * problem.sample } else { 0.0 };
+                        (quantile * variance.max(0.0).sqrt()).hypot(SYSTEMATIC * size).hypot(timing)
                     })
                     .collect();
                 insert(&mut parameters, model, estimate, &half);

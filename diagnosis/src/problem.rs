@@ -155,6 +155,8 @@ pub struct Problem {
     pub entries: Vec<Entry>,
     /// Least and greatest value of each coefficient.
     pub bounds: Vec<(f64, f64)>,
+    /// Time between two samples of the fastest log, s.
+    pub sample: f64,
     /// Typical effort of each joint, N m or N.
     pub scale: Vec<f64>,
     /// Noise floor of each joint, N m or N.
@@ -189,7 +191,8 @@ impl Problem {
     ) -> Problem {
         let n = model.dof();
         let terms: Vec<Term> = terms.into_iter().filter(|t| t.candidate.joints.iter().all(|&j| moving[j])).collect();
-        let half_sample = 0.5 * signals.iter().map(|s| s.raw.dt).fold(f64::INFINITY, f64::min);
+        let sample = signals.iter().map(|s| s.raw.dt).fold(f64::INFINITY, f64::min);
+        let half_sample = 0.5 * sample;
         let mut entries = Vec::new();
         let mut bounds = vec![(-half_sample, half_sample)];
         let mut joints: Vec<JointRows> = (0..n)
@@ -267,6 +270,7 @@ impl Problem {
         Problem {
             entries,
             bounds,
+            sample,
             scale,
             noise: noise.to_vec(),
             sigma: vec![1.0; n],

@@ -155,7 +155,7 @@ impl Logs<'_> {
             .par_iter()
             .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
             .collect();
-        let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof());
+        let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof(), 0.0);
         let data = self.data(&noise);
         let mut candidates = Candidate::all(self.model);
         let mut ranges = ranges(self.model, &self.signals);
@@ -181,7 +181,9 @@ impl Logs<'_> {
         }
         candidates.retain(|c| !forbidden.contains(&c.kind));
         let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
-        let mut all = data.problem(candidates.iter().map(open).collect(), &Kind::LINEAR);
+        // A push is known by when it comes: it is no outlier.
+        let weighing = [&Kind::LINEAR[..], &[Kind::ExternalContact]].concat();
+        let mut all = data.problem(candidates.iter().map(open).collect(), &weighing);
         progress("choosing effects", 0.2);
         let mut choice = select::choose(&mut all, &self.band, &[]);
         let mut round = 0;

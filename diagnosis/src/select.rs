@@ -27,7 +27,7 @@ const DRY: [Kind; 4] = [Kind::CoulombFriction, Kind::StribeckFriction, Kind::Pre
 /// A rotor's inertia is part of the last two.
 const DRIVE: [Kind; 3] = [Kind::Armature, Kind::JointElasticity, Kind::Backlash];
 /// Ways in which effort acts late.
-const LATE: [Kind; 2] = [Kind::ActuationDelay, Kind::ActuatorLag];
+pub const LATE: [Kind; 2] = [Kind::ActuationDelay, Kind::ActuatorLag];
 /// A spring's rest position is a bias.
 const CONSTANT: [Kind; 2] = [Kind::ParallelSpring, Kind::TorqueBias];
 /// Candidates that a first look sends to be held out, in each direction of the search.

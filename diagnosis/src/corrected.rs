@@ -170,12 +170,23 @@ pub fn residual(
     standstill: &[f64],
     alignment: f64,
 ) -> Vec<Vec<f64>> {
+    aligned(model, signals, standstill, alignment, |motion| plant.residuals(motion))
+}
+
+/// What a function makes of a measured motion whose effort acts by `alignment` s late against the position.
+pub fn aligned<T>(
+    model: &Model,
+    signals: &Signals,
+    standstill: &[f64],
+    alignment: f64,
+    of: impl FnOnce(&Motion<'_>) -> T,
+) -> T {
     let motion = signals.motion(model, standstill);
     if alignment == 0.0 {
-        return plant.residuals(&motion);
+        return of(&motion);
     }
     let shift = |(tau, rate): (&f64, &f64)| tau - alignment * rate;
     let tau: Vec<Vec<f64>> =
         signals.tau.iter().zip(&signals.tau_rate).map(|(t, r)| t.iter().zip(r).map(shift).collect()).collect();
-    plant.residuals(&Motion { tau: &tau, ..motion })
+    of(&Motion { tau: &tau, ..motion })
 }

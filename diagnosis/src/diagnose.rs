@@ -370,21 +370,28 @@ impl Logs<'_> {
             let sums = gap::total(&gap::squares(&self.band, &alone.rows, |_| true));
             let shrink =
                 torque.shrink.zip(torque.before).map(|(_, before)| 1.0 - gap::weighted_rms(&sums, weights) / before);
-            let rival = rivals.iter().find(|r| r.without == kind);
-            let confused = rival.filter(|r| r.probability > INDISTINGUISHABLE).map_or_else(Vec::new, |r| {
-                select::kinds(&chosen.all, &r.choice.set)
-                    .into_iter()
-                    .filter(|k| !kinds.contains(k))
-                    .map(|k| k.name().to_owned())
-                    .collect()
-            });
+            let turned = chosen.turned.iter().find(|t| t.drive.kind == kind);
+            // The choice sees a drive by its rotor.
+            let seen_as = if turned.is_some() { Kind::Armature } else { kind };
+            let rival = rivals.iter().find(|r| r.without == seen_as);
+            let doubt = turned.map_or_else(|| rival.map_or(0.0, |r| r.probability), |t| t.doubt);
+            let confused = rival
+                .filter(|_| turned.is_none())
+                .filter(|r| r.probability > INDISTINGUISHABLE)
+                .map_or_else(Vec::new, |r| {
+                    select::kinds(&chosen.all, &r.choice.set)
+                        .into_iter()
+                        .filter(|k| !kinds.contains(k))
+                        .map(|k| k.name().to_owned())
+                        .collect()
+                });
             let loss = rival.map_or(0.0, |r| r.choice.blocks.iter().sum::<f64>());
             found.push((
                 loss,
                 FoundEffect {
                     kind: kind.name().to_owned(),
                     joints: effect.law().joints(),
-                    confidence: (1.0 - rival.map_or(0.0, |r| r.probability)) * (1.0 - misfit).powi(MISFIT),
+                    confidence: (1.0 - doubt) * (1.0 - misfit).powi(MISFIT),
                     parameters: fit.parameters(problem, self.model, kind, &own),
                     indistinguishable_from: confused,
                     shrink: EffectShrink { torque: shrink },

@@ -4,7 +4,7 @@ use crate::problem::Problem;
 use crate::schema::{Estimate, Parameter, Quantity};
 use crate::select::LATE;
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::{Effect, Kind, Value};
+use gapscope_effects::{Candidate, Effect, Kind, Value};
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -105,6 +105,12 @@ impl Fit {
                 Some(effects.iter().find(|e| e.kind() == kind)?.law().parameters())
             };
             let Some(estimates) = values(&theta) else { continue };
+            let candidate = &problem.entries[c].candidate;
+            // What a knob known by other means may be off by.
+            let knob_moved: Option<Vec<Value>> = (candidate.knob_error > 0.0).then_some(candidate).and_then(|known| {
+                let moved = Candidate { shape: known.shape + known.knob_error, ..known.clone() }.effects(model, &theta);
+                Some(moved.iter().find(|e| e.kind() == kind)?.law().parameters())
+            });
             let slopes: Vec<Option<(f64, Vec<Value>)>> = (0..theta.len())
                 .map(|i| {
                     let step = STEP * own[(i, i)].sqrt();
@@ -130,8 +136,12 @@ impl Fit {
                             .flat_map(|i| (0..at.len()).map(move |k| (i, k)))
                             .map(|(i, k)| gradient[i] * own[(i, k)] * gradient[k])
                             .sum();
+                        let knob = knob_moved
+                            .as_ref()
+                            .map_or(0.0, |moved| moved[v].value[component] - estimate.value[component]);
+                        let variance = variance.max(0.0) + knob * knob;
                         let timing = if LATE.contains(&kind) { TIMING * problem.sample } else { 0.0 };
-                        (quantile * variance.max(0.0).sqrt()).hypot(SYSTEMATIC * size).hypot(timing)
+                        (quantile * variance.sqrt()).hypot(SYSTEMATIC * size).hypot(timing)
                     })
                     .collect();
                 insert(&mut parameters, model, estimate, &half);

@@ -70,6 +70,12 @@ pub fn typical(blocks: &[Vec<f64>], weights: &[f64]) -> f64 {
     each.get(each.len() / 2).copied().unwrap_or(0.0)
 }
 
+/// Weighted root mean square as the geometric mean over blocks.
+pub fn mean_level(blocks: &[Vec<f64>], weights: &[f64]) -> f64 {
+    let sum: f64 = blocks.iter().map(|block| weighted_rms(block, weights).max(f64::MIN_POSITIVE).ln()).sum();
+    (sum / blocks.len().max(1) as f64).exp()
+}
+
 /// Adds up blocks.
 pub fn total(blocks: &[Vec<f64>]) -> Vec<f64> {
     let mut sum = vec![0.0; blocks.first().map_or(0, Vec::len)];

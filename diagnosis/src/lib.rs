@@ -12,6 +12,7 @@ mod constancy;
 mod contact;
 mod corrected;
 mod diagnose;
+mod drive;
 mod estimate;
 mod evaluate;
 mod evidence;

@@ -9,7 +9,7 @@ use crate::problem::Problem;
 use crate::schema::Power;
 use crate::select;
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::{Candidate, EncoderSide, Kind};
+use gapscope_effects::{Candidate, Kind};
 use nalgebra::{DMatrix, DVector};
 
 /// Part of a column's size below which what the set leaves of it is rounding.
@@ -42,9 +42,6 @@ fn sizes(model: &Model, problem: &Problem, set: &[usize], kind: Kind, joints: &[
     let mut here: Vec<usize> = (0..problem.entries.len())
         .filter(|&c| problem.entries[c].candidate.kind == kind && problem.entries[c].candidate.joints == joints)
         .collect();
-    // With the encoder on the motor's side a spring or play shows in the link's motion, whatever the rotor's inertia.
-    let elastic = matches!(kind, Kind::JointElasticity | Kind::Backlash);
-    here.retain(|&c| !elastic || problem.entries[c].candidate.side == EncoderSide::Motor);
     here.sort_by(|&a, &b| problem.entries[a].candidate.shape.total_cmp(&problem.entries[b].candidate.shape));
     let Some(&first) = here.first() else { return Vec::new() };
     let named = |parameter: &str, size: Option<f64>, unit: &str| Power {
@@ -107,16 +104,14 @@ fn gauges(model: &Model, candidate: &Candidate) -> Vec<Gauge> {
         Kind::TorqueRipple => along("amplitude", &[1.0, 0.0]),
         Kind::ParallelSpring => Gauge { beside_others: true, ..along("stiffness", &[1.0, 0.0]) },
         Kind::JointZeroOffset => along("offset", &[1.0]),
-        Kind::JointElasticity => along("stiffness", &[0.0, 1.0]),
-        Kind::Backlash => along("gap", &[0.0, 1.0]),
         Kind::Payload => point("mass"),
         Kind::LinkInertiaError => point("mass_delta"),
         Kind::JointCoupling => along("coulomb", &[0.0, 1.0, 0.0]),
         Kind::ActuationDelay => along("delay", &[1.0]),
         Kind::ActuatorLag => along("time_constant", &[1.0]),
         Kind::GravityMisalignment => return vec![along("roll", &[0.0, 1.0]), along("pitch", &[1.0, 0.0])],
-        // When something pushes is not known before; a limit is no coefficient.
-        Kind::ExternalContact | Kind::TorqueSaturation => return Vec::new(),
+        // When something pushes is not known before; a limit is no coefficient; spring and play have no column.
+        Kind::ExternalContact | Kind::TorqueSaturation | Kind::JointElasticity | Kind::Backlash => return Vec::new(),
     };
     vec![one]
 }

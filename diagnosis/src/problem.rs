@@ -22,8 +22,6 @@ const MATERIAL: f64 = 3.0;
 /// ... by this part of the noise, which many rows average out, and by all of what no candidate explains beyond the noise,
 /// which no number of rows averages out: with unknown effects of that size about, a smaller one cannot be named.
 pub const OF_NOISE: f64 = 0.2;
-/// Resonance of a link on its locked drive, Hz, below which no drive is built.
-const SOFTEST: f64 = 1.5;
 /// Eigenvalues of a candidate's normal equations below this part of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-6;
 /// Part of a column's size below which what a set leaves of it is rounding.
@@ -165,6 +163,8 @@ pub struct Problem {
     pub sigma: Vec<f64>,
     /// Least root mean square torque by which an effect must move a joint to be named on its account, N m or N.
     pub least: Vec<f64>,
+    /// Root mean square of what all effects together are to explain of each joint, N m or N.
+    pub gap: Vec<f64>,
     /// Rows of each joint that count as one independent row.
     correlation: Vec<f64>,
     joints: Vec<JointRows>,
@@ -275,6 +275,7 @@ impl Problem {
             noise: noise.to_vec(),
             sigma: vec![1.0; n],
             least: vec![0.0; n],
+            gap: joints.iter().map(JointRows::gap).collect(),
             correlation: vec![1.0; n],
             joints,
             fold_of_block,
@@ -340,17 +341,13 @@ impl Problem {
     }
 
     /// Whether a robot could have an entry with these coefficients. A law that wants to be more than its bounds is some
-    /// other law (nothing at all, zero, it can be), and so is a drive in which the link would sway.
+    /// other law (nothing at all, zero, it can be).
     pub fn plausible(&self, c: usize, theta: &[f64]) -> bool {
         let entry = &self.entries[c];
-        let inside = theta
+        theta
             .iter()
             .zip(&self.bounds[entry.columns.clone()])
-            .all(|(&theta, &(low, high))| theta < high && (theta > low || low == 0.0));
-        let candidate = &entry.candidate;
-        let softest = candidate.inertia * (std::f64::consts::TAU * SOFTEST).powi(2);
-        let stiff = candidate.kind != Kind::JointElasticity || candidate.stiffness(theta).is_some_and(|k| k > softest);
-        inside && stiff
+            .all(|(&theta, &(low, high))| theta < high && (theta > low || low == 0.0))
     }
 
     /// Number of blocks that hold rows.
@@ -710,6 +707,11 @@ impl Problem {
 }
 
 impl JointRows {
+    fn gap(&self) -> f64 {
+        let sum: f64 = self.linear_target.iter().map(|x| x * x).sum();
+        (sum / self.linear_target.len().max(1) as f64).sqrt()
+    }
+
     fn predict(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {
         let used: Vec<(usize, f64)> = columns
             .iter()

@@ -11,10 +11,10 @@ use crate::screen;
 use crate::select::{self, Choice};
 use crate::signals::Signals;
 use crate::verdict;
-use gapscope_dynamics::{Data, Model};
+use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, EffectError, Kind, Plant, Range};
-use nalgebra::DMatrix;
 use rayon::prelude::*;
+use statrs::function::erf::erfc;
 
 /// A torque this many times its noise is no artefact of it.
 const CLEAR: f64 = 8.0;
@@ -22,12 +22,33 @@ const CLEAR: f64 = 8.0;
 const MANY: usize = 3;
 /// Another account of a drive is better where it leaves this part of the gap.
 const BETTER: f64 = 0.95;
-/// Poses of an episode that an inertia is the mean of.
-const POSES: usize = 50;
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
 /// Kinds that with many coefficients, or with one for all that a joint carries, can promise more than they keep.
 const INERTIAL: [Kind; 4] = [Kind::Payload, Kind::LinkInertiaError, Kind::GravityMisalignment, Kind::TorqueGainError];
+
+/// Kinds of which a spring or play in the drive is one, or takes the rotor along.
+const DRIVE: [Kind; 3] = [Kind::Armature, Kind::JointElasticity, Kind::Backlash];
+/// Kinds that a first look may have taken for a drive that turns on its own.
+const STANDS_IN: [Kind; 11] = [
+    Kind::Armature,
+    Kind::JointElasticity,
+    Kind::Backlash,
+    Kind::LinkInertiaError,
+    Kind::Payload,
+    Kind::TorqueGainError,
+    Kind::JointZeroOffset,
+    Kind::TorqueSaturation,
+    Kind::TorqueBias,
+    Kind::ParallelSpring,
+    Kind::GravityMisalignment,
+];
+/// Part of the squared gap that no drive is looked for in.
+const NOTHING_LEFT: f64 = 1e-3;
+/// What a kind more must take away, relative, where two sets with drives are compared.
+const A_KIND: f64 = 0.02;
+/// Accounts of drives that are tried beside the whole set.
+const ACCOUNTS: usize = 2;
 
 /// What the search came to.
 pub(crate) struct Chosen {
@@ -41,6 +62,19 @@ pub(crate) struct Chosen {
     pub fit: Fit,
     /// Noise floor of each joint.
     pub noise: Vec<f64>,
+    /// Springs and play, each in the place of its rotor.
+    pub turned: Vec<Turned>,
+}
+
+/// A drive that turns on its own.
+#[derive(Debug, Clone)]
+pub(crate) struct Turned {
+    /// The rotor's place among all candidates: by its column, with the rest bent, the choice sees the drive.
+    pub place: usize,
+    /// Spring or play, its knob known.
+    pub drive: Candidate,
+    /// Probability that the drive is rigid.
+    pub doubt: f64,
 }
 
 impl Logs<'_> {
@@ -72,8 +106,10 @@ impl Logs<'_> {
                 best = (after, linear);
             }
         }
-        if judged(best.0).leaves_any() {
-            let chosen = self.drives(best.1)?;
+        let stands_in = |chosen: &Chosen| chosen.exact.entries.iter().any(|e| STANDS_IN.contains(&e.candidate.kind));
+        let rest = judged(best.0);
+        if rest.unexplained_fraction() > NOTHING_LEFT && (rest.leaves_any() || stands_in(&best.1)) {
+            let chosen = self.drives(best.1, progress)?;
             best = (left(&chosen)?, chosen);
         }
         if best.1.fit.set.is_empty() || best.0 < before {
@@ -91,49 +127,71 @@ impl Logs<'_> {
         Ok(Chosen { choice, exact, fit, ..chosen })
     }
 
-    /// Tries the other accounts of the one drive or rotor that was found, each at its exact parameters: a spring or play, the
-    /// encoder on either side. The first look, to first order, may take one for another, or for a rotor alone. Play chatters at times as no simulation follows: the typical stretch of time is what counts.
-    fn drives(&self, mut best: Chosen) -> Result<Chosen, EffectError> {
-        let turns = |kind: Kind| matches!(kind, Kind::JointElasticity | Kind::Backlash);
-        let kind_of = |c: usize| best.all.entries[c].candidate.kind;
-        let of = |pick: &dyn Fn(Kind) -> bool| -> Vec<usize> {
-            best.choice.set.iter().copied().filter(|&c| pick(kind_of(c))).collect()
-        };
+    /// Puts springs and play in the drives where an account of a joint with one leaves less of it than the set does, each at
+    /// its exact law: once beside all else that was found, and once without what may have stood in for it.
+    fn drives(&self, best: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
-        let squares = |chosen: &Chosen| -> Result<Vec<Vec<f64>>, EffectError> {
+        let blocks = |chosen: &Chosen| -> Result<Vec<Vec<f64>>, EffectError> {
             let rows = self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows;
             Ok(gap::squares(&self.band, &rows, |_| true))
         };
-        let place = match (of(&turns).as_slice(), of(&|kind| kind == Kind::Armature).as_slice()) {
-            (&[one], _) | (&[], &[one]) => one,
-            _ => return Ok(best),
-        };
-        let drive = best.all.entries[place].candidate.clone();
-        let rest: Vec<usize> = best.choice.set.iter().copied().filter(|&c| c != place).collect();
-        let mut seen = vec![(drive.kind, drive.side)];
-        let mut others = Vec::new();
-        for (c, entry) in best.all.entries.iter().enumerate() {
-            let other = &entry.candidate;
-            if turns(other.kind) && other.joints == drive.joints && !seen.contains(&(other.kind, other.side)) {
-                seen.push((other.kind, other.side));
-                others.push(c);
+        let kinds = |chosen: &Chosen| select::kinds(&chosen.exact, &chosen.fit.set).len() as f64;
+        let mut better: Option<(f64, Chosen)> = None;
+        for gone in [&DRIVE[..], &STANDS_IN] {
+            let goes = |candidate: &Candidate| gone.contains(&candidate.kind) && !candidate.turns();
+            let stay: Vec<usize> =
+                (0..best.exact.entries.len()).filter(|&i| !goes(&best.exact.entries[i].candidate)).collect();
+            if gone == STANDS_IN
+                && !best.exact.entries.iter().any(|e| goes(&e.candidate) && !DRIVE.contains(&e.candidate.kind))
+            {
+                continue;
+            }
+            let others: Vec<Candidate> = stay.iter().map(|&i| best.exact.entries[i].candidate.clone()).collect();
+            let (effects, side, alignment) = if gone == STANDS_IN {
+                let (exact, fit) = self.data(&best.noise).refine(&others)?;
+                (fit.effects(&exact, self.model), exact.side(&fit.set), fit.alignment())
+            } else {
+                let fit = Fit { set: stay.clone(), ..best.fit.clone() };
+                (fit.effects(&best.exact, self.model), best.exact.side(&stay), best.fit.alignment())
+            };
+            for account in self.accounts(&effects, side, alignment)?.into_iter().take(ACCOUNTS) {
+                let joint = account.drive.joints[0];
+                let rotor = Candidate::new(Kind::Armature, vec![joint]);
+                let Some(place) = best.all.entries.iter().position(|e| e.candidate == rotor) else { continue };
+                let leaves = |c: usize| {
+                    let candidate = &best.all.entries[c].candidate;
+                    gone.contains(&candidate.kind)
+                        && !best.turned.iter().any(|t| t.place == c)
+                        && (gone == STANDS_IN || candidate.joints.contains(&joint))
+                };
+                let mut set: Vec<usize> = best.choice.set.iter().copied().filter(|&c| !leaves(c)).collect();
+                set.push(place);
+                set.sort_unstable();
+                set.dedup();
+                let turned = Turned {
+                    place,
+                    drive: account.drive,
+                    doubt: 0.5 * erfc(account.beyond / std::f64::consts::SQRT_2),
+                };
+                let turned: Vec<Turned> = best.turned.iter().cloned().chain([turned]).collect();
+                let next = self.converge(best.all.clone(), set, best.noise.clone(), turned, progress)?;
+                let there = |chosen: &Chosen| {
+                    chosen.exact.entries.iter().any(|e| e.candidate.turns() && e.candidate.joints == [joint])
+                };
+                let (before, after) = (blocks(&best)?, blocks(&next)?);
+                let own: Vec<f64> = (0..weights.len()).map(|j| if j == joint { weights[j] } else { 0.0 }).collect();
+                let typical = |weights: &[f64]| (gap::mean_level(&before, weights), gap::mean_level(&after, weights));
+                let ((before, after), (own_before, own_after)) = (typical(&weights), typical(&own));
+                if there(&next) && own_after < BETTER * own_before && after <= before {
+                    let level = after * (1.0 + A_KIND * kinds(&next));
+                    if better.as_ref().is_none_or(|(least, _)| level < *least) {
+                        better = Some((level, next));
+                    }
+                    break;
+                }
             }
         }
-        let mut least = BETTER * gap::typical(&squares(&best)?, &weights);
-        for c in others {
-            let mut set: Vec<usize> = rest.iter().copied().chain([c]).collect();
-            set.sort_unstable();
-            let (exact, fit) = self.data(&best.noise).refine(&self.candidates(&best.all, &set))?;
-            let physical = fit.effects(&exact, self.model).iter().any(|e| turns(e.kind()));
-            let choice = select::evaluate(&best.all, set);
-            let chosen = Chosen { all: best.all.clone(), choice, exact, fit, noise: best.noise.clone() };
-            let typical = gap::typical(&squares(&chosen)?, &weights);
-            if physical && typical < least {
-                least = BETTER * typical;
-                best = chosen;
-            }
-        }
-        Ok(best)
+        Ok(better.map_or(best, |(_, better)| better))
     }
 
     /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first.
@@ -142,7 +200,8 @@ impl Logs<'_> {
             constancy::inconsistent(&chosen.exact, &chosen.fit, &self.signals, &self.band).first()
         {
             chosen.choice.set.remove(worst);
-            let (exact, fit) = self.data(&chosen.noise).refine(&self.candidates(&chosen.all, &chosen.choice.set))?;
+            let (exact, fit) =
+                self.data(&chosen.noise).refine(&with_drives(&chosen.all, &chosen.choice.set, &chosen.turned))?;
             let choice = select::evaluate(&chosen.all, chosen.choice.set);
             chosen = Chosen { exact, fit, choice, ..chosen };
         }
@@ -185,17 +244,37 @@ impl Logs<'_> {
         let weighing = [&Kind::LINEAR[..], &[Kind::ExternalContact]].concat();
         let mut all = data.problem(candidates.iter().map(open).collect(), &weighing);
         progress("choosing effects", 0.2);
-        let mut choice = select::choose(&mut all, &self.band, &[]);
+        let choice = select::choose(&mut all, &self.band, &[]);
+        self.converge(all, choice.set, noise, Vec::new(), progress)
+    }
+
+    /// From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
+    fn converge(
+        &self,
+        mut all: Problem,
+        set: Vec<usize>,
+        noise: Vec<f64>,
+        turned: Vec<Turned>,
+        progress: Progress<'_>,
+    ) -> Result<Chosen, EffectError> {
+        let data = self.data(&noise);
+        let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
+        let mut choice = select::evaluate(&all, set);
         let mut round = 0;
         loop {
             progress("refining effects", 0.3 + 0.08 * round as f64);
             round += 1;
-            let (exact, fit) = data.refine(&self.candidates(&all, &choice.set))?;
+            let (exact, fit) = data.refine(&with_drives(&all, &choice.set, &turned))?;
             // The choice again, around the parameters found: knobs turned, and what bends taken into account.
-            let changes: Vec<(usize, Candidate)> =
-                choice.set.iter().zip(&exact.entries).map(|(&c, e)| (c, e.candidate.clone())).collect();
+            let changes: Vec<(usize, Candidate)> = choice
+                .set
+                .iter()
+                .zip(&exact.entries)
+                .filter(|(_, e)| !e.candidate.turns())
+                .map(|(&c, e)| (c, e.candidate.clone()))
+                .collect();
             if round == ROUNDS || choice.set.is_empty() {
-                return Ok(Chosen { all, choice, exact, fit, noise });
+                return Ok(Chosen { all, choice, exact, fit, noise, turned });
             }
             all.replace(self.model, &self.signals, &self.band, &self.still, &changes);
             let at: Vec<usize> = (0..exact.entries.len()).collect();
@@ -208,19 +287,20 @@ impl Logs<'_> {
             let same = again.set == choice.set;
             choice = again;
             if same {
-                return Ok(Chosen { all, choice, exact, fit, noise });
+                return Ok(Chosen { all, choice, exact, fit, noise, turned });
             }
         }
     }
+}
 
-    fn candidates(&self, problem: &Problem, set: &[usize]) -> Vec<Candidate> {
-        set.iter().map(|&c| problem.entries[c].candidate.clone()).collect()
-    }
+/// The candidates of a set, a drive in the place of its rotor.
+fn with_drives(problem: &Problem, set: &[usize], turned: &[Turned]) -> Vec<Candidate> {
+    let own = |c: usize| turned.iter().find(|t| t.place == c).map(|t| t.drive.clone());
+    set.iter().map(|&c| own(c).unwrap_or_else(|| problem.entries[c].candidate.clone())).collect()
 }
 
 /// What each joint does in the logs.
 fn ranges(model: &Model, signals: &[Signals]) -> Vec<Range> {
-    let inertia = inertia(model, signals);
     let quantile =
         |sorted: &[f64], part: f64| sorted.get((part * sorted.len() as f64) as usize).copied().unwrap_or(0.0);
     (0..model.dof())
@@ -238,26 +318,9 @@ fn ranges(model: &Model, signals: &[Signals]) -> Vec<Range> {
                 span: place.last().zip(place.first()).map_or(0.0, |(last, first)| last - first),
                 torque: quantile(&torque, 0.995),
                 duration: signals.iter().map(|s| s.len() as f64 * s.dt).fold(0.0, f64::max),
-                inertia: inertia[j],
             }
         })
         .collect()
-}
-
-/// Inertia of the nominal robot about each joint, the mean of some poses of the logs, kg m² or kg.
-fn inertia(model: &Model, signals: &[Signals]) -> Vec<f64> {
-    let n = model.dof();
-    let mut sum = DMatrix::zeros(n, n);
-    let (mut data, mut mass, mut q) = (Data::new(model), DMatrix::zeros(n, n), vec![0.0; n]);
-    for s in signals {
-        for k in (0..s.len()).step_by((s.len() / POSES).max(1)) {
-            Signals::gather(&s.q, k, &mut q);
-            model.mass_matrix(&mut data, &q, &mut mass);
-            sum += &mass;
-        }
-    }
-    let trials = signals.iter().map(|s| (0..s.len()).step_by((s.len() / POSES).max(1)).len()).sum::<usize>();
-    sum.diagonal().iter().map(|m| m / trials.max(1) as f64).collect()
 }
 
 fn median(mut x: Vec<f64>) -> f64 {

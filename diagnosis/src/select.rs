@@ -2,7 +2,7 @@
 
 use crate::band::Band;
 use crate::problem::{OF_NOISE, Problem};
-use gapscope_effects::{Candidate, Kind};
+use gapscope_effects::Kind;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -24,8 +24,6 @@ const SHARED: [Kind; 9] = [
 ];
 /// Dry friction of a joint is one of these.
 const DRY: [Kind; 4] = [Kind::CoulombFriction, Kind::StribeckFriction, Kind::PreslidingFriction, Kind::ThermalDrift];
-/// A rotor's inertia is part of the last two.
-const DRIVE: [Kind; 3] = [Kind::Armature, Kind::JointElasticity, Kind::Backlash];
 /// Ways in which effort acts late.
 pub const LATE: [Kind; 2] = [Kind::ActuationDelay, Kind::ActuatorLag];
 /// A spring's rest position is a bias.
@@ -36,15 +34,17 @@ const SHORTLIST: usize = 12;
 const RARE_COST: f64 = 2.0;
 /// A candidate stays where leaving it out costs more than this many standard errors of the paired difference over blocks.
 pub const STANDARD_ERRORS: f64 = 2.0;
-/// Kinds whose signature is cut from the measured effort or differentiates the position four times: it holds their noise,
-/// and so explains some of it, held-out rows included.
-const HOLD_NOISE: [Kind; 3] = [Kind::TorqueSaturation, Kind::JointElasticity, Kind::Backlash];
+/// Kinds whose signature is cut from the measured effort: it holds its noise, and so explains some of it, held-out rows
+/// included.
+const HOLD_NOISE: [Kind; 1] = [Kind::TorqueSaturation];
 /// What such a signature must move, over the noise.
 const OVER_NOISE: f64 = 1.5;
 /// A candidate stays where the deviance without it is this many times that with it.
 const DECISIVE: f64 = 1.5;
 /// The same for a further joint of a kind that joints usually share.
 const SHARED_STANDARD_ERRORS: f64 = 0.5;
+/// Part of a joint's gap that an effect must move it by: laws of its neighbours are not exact to better.
+const OF_GAP: f64 = 0.01;
 /// And the part of the least torque of a new effect that it must move the joint by.
 const SHARED_SIZE: f64 = 0.5;
 /// Moves towards a rival: what explains the same does so soon.
@@ -143,13 +143,11 @@ enum Reach {
 }
 
 /// Laws that hold a simpler one.
-const NESTED: [(Kind, Kind); 6] = [
+const NESTED: [(Kind, Kind); 4] = [
     (Kind::ParallelSpring, Kind::TorqueBias),
     (Kind::StribeckFriction, Kind::CoulombFriction),
     (Kind::PreslidingFriction, Kind::CoulombFriction),
     (Kind::ThermalDrift, Kind::CoulombFriction),
-    (Kind::JointElasticity, Kind::Armature),
-    (Kind::Backlash, Kind::Armature),
 ];
 
 /// Takes the simpler of two nested laws, a bias for a spring, where the richer one is not better by two standard errors or
@@ -336,10 +334,7 @@ fn moves(problem: &Problem, set: &[usize], forbidden: &[Kind], reach: Reach) -> 
 pub fn excludes(problem: &Problem, a: usize, b: usize) -> bool {
     let (a, b) = (&problem.entries[a].candidate, &problem.entries[b].candidate);
     let both = |family: &[Kind]| family.contains(&a.kind) && family.contains(&b.kind);
-    let elastic = |c: &Candidate| matches!(c.kind, Kind::JointElasticity | Kind::Backlash);
-    (a.joints == b.joints && (a.kind == b.kind || both(&DRY) || both(&DRIVE) || both(&CONSTANT)))
-        || both(&LATE)
-        || (elastic(a) && elastic(b) && a.side != b.side)
+    (a.joints == b.joints && (a.kind == b.kind || both(&DRY) || both(&CONSTANT))) || both(&LATE)
 }
 
 /// Whether a candidate's kind is one that joints usually share and stands at other joints of the set too.
@@ -352,6 +347,7 @@ fn is_shared(problem: &Problem, set: &[usize], c: usize) -> bool {
 pub fn least_moved(problem: &Problem, set: &[usize], c: usize, joint: usize) -> f64 {
     let least = if is_shared(problem, set, c) { SHARED_SIZE } else { 1.0 } * problem.least[joint];
     let holds_noise = HOLD_NOISE.contains(&problem.entries[c].candidate.kind);
+    let least = least.max(OF_GAP * problem.gap[joint]);
     least.max(if holds_noise { OVER_NOISE } else { OF_NOISE } * problem.noise[joint])
 }
 

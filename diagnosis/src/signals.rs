@@ -49,6 +49,8 @@ pub struct Signals {
     pub tau_rate: Vec<Vec<f64>>,
     /// Torque of the nominal robot on this motion, damping and friction of its URDF included, N m or N.
     pub nominal: Vec<Vec<f64>>,
+    /// Standard deviation of the white noise of each joint's position, rad or m.
+    pub position_noise: Vec<f64>,
     /// Standard deviation of the noise of each joint's velocity, rad/s or m/s.
     pub velocity_noise: Vec<f64>,
     /// Standard deviation of the noise of each joint's logged effort, sample by sample, N m or N.
@@ -95,7 +97,8 @@ impl Signals {
         // The derivative of a held signal sits half a sample late, like the signal itself; fine for an alignment column.
         let tau_rate = each(&rate_weights, &effort, kernel.reach + 1);
         let gain = kernel.first.iter().map(|w| w * w).sum::<f64>().sqrt();
-        let velocity_noise = raw.position.iter().map(|x| white_noise(x) * gain).collect();
+        let position_noise: Vec<f64> = raw.position.iter().map(|x| white_noise(x)).collect();
+        let velocity_noise = position_noise.iter().map(|noise| noise * gain).collect();
         let effort_noise = effort.iter().map(|x| white_noise(x)).collect();
         let signal_dt = dt * stride as f64;
         let mut signals = Signals {
@@ -111,6 +114,7 @@ impl Signals {
             tau,
             tau_rate,
             nominal: vec![Vec::with_capacity(length); n],
+            position_noise,
             velocity_noise,
             effort_noise,
             held: kernel.held.clone(),

@@ -8,12 +8,7 @@
 //! which the link alone, at the middle of its range, would vibrate at 20 Hz on the locked motor.
 
 use crate::effect::{Law, Value, check, per_joint};
-use crate::joint_elasticity::{ahead, behind, link_torque, mean};
-use crate::plant::CONTACT;
-use crate::signature::{Column, EncoderSide};
-use crate::wind_up::{Coupling, WindUp, inertia_about};
-use crate::{EffectError, Kind, Motion, Plant};
-use gapscope_dynamics::Data;
+use crate::{EffectError, Kind, Plant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -45,21 +40,5 @@ impl Law for Backlash {
             plant.drive(j).half_gap += 0.5 * gap;
         }
         Ok(())
-    }
-}
-
-/// Two columns at a gap, rad (m): the rotor's, and what the play adds by the encoder's side. Coefficients: J, and J or one
-/// times by how much wider the gap is.
-///
-/// On the link's side a rotor as heavy as the link is driven through the play by the logged effort; on the motor's side the
-/// link is, by the same torque.
-pub(crate) fn signature(motion: &Motion, joint: usize, gap: f64, side: EncoderSide) -> Vec<Column> {
-    let inertia = inertia_about(motion.model, &mut Data::new(motion.model), motion, joint);
-    let (frequency, ratio) = CONTACT;
-    let contact = Coupling { half_gap: 0.5 * gap, ..Coupling::resonant(mean(&inertia), frequency, ratio) };
-    let wind_up = WindUp::forced(&link_torque(motion, joint, &inertia), &inertia, &contact, motion.dt);
-    match side {
-        EncoderSide::Link => ahead(motion, joint, wind_up.acceleration),
-        EncoderSide::Motor => behind(motion, joint, &wind_up),
     }
 }

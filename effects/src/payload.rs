@@ -97,7 +97,7 @@ pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     columns
 }
 
-/// The physical body nearest to ten inertial parameters; `None` where they have no mass.
+/// The physical body nearest to ten inertial parameters; `None` where they have neither mass nor moments.
 /// Where the mass is negative, a physical body is missing from the link.
 ///
 /// The data determine mass and first moment well and inertia badly, so inertia alone is moved to where it is physical:
@@ -105,7 +105,10 @@ pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
 pub(crate) fn from_coefficients(joint: &str, parameters: &[f64; 10]) -> Option<Payload> {
     let missing = parameters[0] < 0.0;
     let inertia = Inertia::from_parameters(&parameters.map(|p| if missing { -p } else { p }));
-    let mass = inertia.mass;
+    let h = inertia.first_moment;
+    // Below a first joint that does not lift it no mass shows: then it is a point that has these moments.
+    let rotational = Matrix3::from_fn(|r, c| inertia.rotational.col(c)[r]).symmetric_eigenvalues().max();
+    let mass = if inertia.mass == 0.0 && rotational > 0.0 { h.length_squared() / rotational } else { inertia.mass };
     if mass.is_nan() || mass == 0.0 {
         return None;
     }

@@ -7,9 +7,9 @@ use crate::{
     ActuationDelay, ActuatorLag, Armature, Backlash, CoulombFriction, Effect, ExternalContact, JointCoupling,
     JointElasticity, JointZeroOffset, Kind, LoadDependentFriction, Motion, ParallelSpring, PreslidingFriction,
     StribeckFriction, ThermalDrift, TorqueBias, TorqueGainError, TorqueRipple, TorqueSaturation, ViscousFriction,
-    actuation_delay, actuator_lag, armature, backlash, coulomb_friction, external_contact, gravity_misalignment,
-    joint_coupling, joint_elasticity, joint_zero_offset, link_inertia_error, load_dependent_friction, parallel_spring,
-    payload, presliding_friction, stribeck_friction, thermal_drift, torque_bias, torque_gain_error, torque_ripple,
+    actuation_delay, actuator_lag, armature, coulomb_friction, external_contact, gravity_misalignment, joint_coupling,
+    joint_elasticity, joint_zero_offset, link_inertia_error, load_dependent_friction, parallel_spring, payload,
+    presliding_friction, stribeck_friction, thermal_drift, torque_bias, torque_gain_error, torque_ripple,
     torque_saturation, viscous_friction,
 };
 use gapscope_dynamics::{JointKind, Model};
@@ -60,6 +60,8 @@ pub struct Candidate {
     pub inertia: f64,
     /// Side of the transmission that the log shows, for elasticity and play.
     pub side: EncoderSide,
+    /// Standard error of the knob of elasticity or play, which is known by other means than a fit of columns; 0 elsewhere.
+    pub knob_error: f64,
 }
 
 /// What a joint does in the logs: the range in which knobs are looked for.
@@ -73,8 +75,6 @@ pub struct Range {
     pub torque: f64,
     /// Length of the longest episode, s.
     pub duration: f64,
-    /// Inertia of the nominal robot about the joint, in the middle of the logs, kg m² (kg).
-    pub inertia: f64,
 }
 
 /// Stribeck velocities over the joint's top speed.
@@ -85,10 +85,6 @@ const BRISTLE: [f64; 5] = [0.0015, 0.005, 0.015, 0.05, 0.15];
 const DRIFT: [f64; 5] = [0.06, 0.15, 0.35, 0.8, 2.0];
 /// Limits over the torque that the motion takes at most: a limit that is reached is delivered, and no more than it.
 const LIMIT: [f64; 9] = [0.75, 0.85, 0.92, 0.97, 1.0, 1.04, 1.1, 1.2, 1.4];
-/// Resonances of a link on its locked motor, Hz.
-const RESONANCE: [f64; 3] = [8.0, 4.5, 2.5];
-/// Gaps of a play, rad or m.
-const GAP: [f64; 2] = [0.02, 0.008];
 /// Delays and lags, s.
 const LATE: [f64; 4] = [0.002, 0.006, 0.012, 0.025];
 /// Cycles of a ripple: at least one and a half over the span; above that by this part of what the span resolves.
@@ -97,7 +93,7 @@ const RIPPLE: (f64, f64, usize) = (1.5, 0.35, 60);
 impl Candidate {
     /// A candidate without a knob, on the link's side.
     pub fn new(kind: Kind, joints: Vec<usize>) -> Candidate {
-        Candidate { kind, joints, shape: 0.0, inertia: 0.0, side: EncoderSide::Link }
+        Candidate { kind, joints, shape: 0.0, inertia: 0.0, side: EncoderSide::Link, knob_error: 0.0 }
     }
 
     /// Every candidate without a knob to turn that a robot offers: each kind at each joint, payloads at each leaf, couplings
@@ -147,21 +143,16 @@ impl Candidate {
             per_joint(Kind::ThermalDrift, j, DRIFT.map(|part| part * range.duration).to_vec());
             per_joint(Kind::TorqueSaturation, j, LIMIT.map(|part| part * range.torque).to_vec());
         }
-        for (j, range) in ranges.iter().enumerate().filter(|(_, range)| range.inertia > 0.0) {
-            for side in [EncoderSide::Link, EncoderSide::Motor] {
-                let drive = |kind| {
-                    let joint = Candidate { side, inertia: range.inertia, ..Candidate::new(kind, vec![j]) };
-                    move |shape| Candidate { shape, ..joint.clone() }
-                };
-                all.extend(RESONANCE.map(drive(Kind::JointElasticity)));
-                all.extend(GAP.map(drive(Kind::Backlash)));
-            }
-        }
         for kind in [Kind::ActuationDelay, Kind::ActuatorLag] {
             all.extend(LATE.map(|shape| Candidate { shape, ..Candidate::new(kind, vec![]) }));
         }
         all.retain(|c| c.shape.is_finite() && c.shape > 0.0);
         all
+    }
+
+    /// Whether it is a drive that turns on its own: a spring or play.
+    pub fn turns(&self) -> bool {
+        matches!(self.kind, Kind::JointElasticity | Kind::Backlash)
     }
 
     /// Ripples of one joint on a grid of cycles, fine enough that none falls between.
@@ -192,36 +183,9 @@ impl Candidate {
     pub fn secant(&self, coefficients: &[f64]) -> Option<f64> {
         let next = match (self.kind, coefficients) {
             (Kind::ActuationDelay | Kind::ActuatorLag, &[late]) => late.clamp(1e-5, 0.5),
-            (Kind::JointElasticity, &[..]) => {
-                let stiffness = self.stiffness(coefficients)?;
-                ((stiffness / self.inertia).sqrt() / TAU).clamp(0.5, 100.0)
-            }
-            (Kind::Backlash, &[_, _]) => self.gap(coefficients)?.clamp(1e-4, 0.5),
             _ => return None,
         };
         next.is_finite().then_some(next)
-    }
-
-    /// Stiffness of an elastic drive with these coefficients, N m/rad (N/m).
-    pub fn stiffness(&self, coefficients: &[f64]) -> Option<f64> {
-        let stiffness = match (self.kind, self.side, coefficients) {
-            (Kind::JointElasticity, EncoderSide::Link, &[inertia, c]) => inertia / c,
-            (Kind::JointElasticity, EncoderSide::Motor, &[_, softer]) => {
-                self.inertia * (TAU * self.shape).powi(2) / softer
-            }
-            _ => return None,
-        };
-        (stiffness.is_finite() && stiffness > 0.0).then_some(stiffness)
-    }
-
-    /// Gap of a play with these coefficients, rad (m).
-    fn gap(&self, coefficients: &[f64]) -> Option<f64> {
-        let gap = match (self.kind, self.side, coefficients) {
-            (Kind::Backlash, EncoderSide::Link, &[inertia, c]) => self.shape * c / inertia,
-            (Kind::Backlash, EncoderSide::Motor, &[_, wider]) => self.shape * wider,
-            _ => return None,
-        };
-        (gap.is_finite() && gap > 0.0).then_some(gap)
     }
 
     /// A push on each leaf, for motions that know when something pushed.
@@ -239,15 +203,14 @@ impl Candidate {
             (Kind::StribeckFriction, &[j]) => stribeck_friction::signature(motion, j, self.shape),
             (Kind::PreslidingFriction, &[j]) => presliding_friction::signature(motion, j, self.shape),
             (Kind::ThermalDrift, &[j]) => thermal_drift::signature(motion, j, self.shape),
-            (Kind::Armature, &[j]) => armature::signature(motion, j),
+            // Spring and play bend too much for a column: their knob is known, the rotor is what a fit finds.
+            (Kind::Armature | Kind::JointElasticity | Kind::Backlash, &[j]) => armature::signature(motion, j),
             (Kind::TorqueGainError, &[j]) => torque_gain_error::signature(motion, j),
             (Kind::TorqueBias, &[j]) => torque_bias::signature(motion, j),
             (Kind::TorqueSaturation, &[j]) => torque_saturation::signature(motion, j, self.shape),
             (Kind::TorqueRipple, &[j]) => torque_ripple::signature(motion, j, self.shape),
             (Kind::ParallelSpring, &[j]) => parallel_spring::signature(motion, j),
             (Kind::JointZeroOffset, &[j]) => joint_zero_offset::signature(motion, j),
-            (Kind::JointElasticity, &[j]) => joint_elasticity::signature(motion, j, self.shape, self.side),
-            (Kind::Backlash, &[j]) => backlash::signature(motion, j, self.shape, self.side),
             (Kind::Payload | Kind::LinkInertiaError, &[j]) => payload::signature(motion, j),
             (Kind::JointCoupling, &[a, b]) => joint_coupling::signature(motion, [a, b], self.shape),
             (Kind::GravityMisalignment, _) => gravity_misalignment::signature(motion),
@@ -297,15 +260,14 @@ impl Candidate {
                 Effect::ParallelSpring(ParallelSpring { stiffness: single(k), rest_position: single(kq / k) })
             }
             (Kind::JointZeroOffset, &[offset]) => Effect::JointZeroOffset(JointZeroOffset { offset: single(offset) }),
-            (Kind::JointElasticity, &[inertia, _]) if inertia >= 0.0 => {
-                let Some(stiffness) = self.stiffness(coefficients) else { return Vec::new() };
+            (Kind::JointElasticity, &[inertia]) if inertia >= 0.0 => {
+                let stiffness = self.inertia * (TAU * self.shape).powi(2);
                 let damping = 2.0 * joint_elasticity::RATIO * (stiffness * self.inertia).sqrt();
                 let spring = JointElasticity { stiffness: single(stiffness), damping: single(damping) };
                 return vec![Effect::JointElasticity(spring), rotor(inertia)];
             }
-            (Kind::Backlash, &[inertia, _]) if inertia >= 0.0 => {
-                let Some(gap) = self.gap(coefficients) else { return Vec::new() };
-                return vec![Effect::Backlash(Backlash { gap: single(gap) }), rotor(inertia)];
+            (Kind::Backlash, &[inertia]) if inertia >= 0.0 => {
+                return vec![Effect::Backlash(Backlash { gap: single(self.shape) }), rotor(inertia)];
             }
             (Kind::ExternalContact, &[x, y, z]) => Effect::ExternalContact(ExternalContact {
                 link: self.joints.first().map(|&j| name(j)).unwrap_or_default(),

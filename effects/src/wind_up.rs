@@ -1,12 +1,18 @@
 //! How far a motor turns ahead of its link along a measured run.
 
-use crate::Motion;
-use crate::filter::{first_derivative, second_derivative};
+use crate::filter::{first_derivative, first_order, second_derivative};
+use crate::plant::CONTACT;
+use crate::{Candidate, EncoderSide, Kind, Motion};
 use gapscope_dynamics::{Data, Model};
 use nalgebra::DMatrix;
 
 /// Longest step of the oscillator, s: a contact at 20 Hz takes a hundred of them a period.
 const STEP: f64 = 5e-4;
+
+/// Damping ratio of the flattest response (Butterworth).
+const FLAT: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Torque that shows play to be taken up, over what would wind the coupling by half the gap.
+const TAKEN_UP: f64 = 0.01;
 
 /// What joins motor and link: torque k δ + d δ̇ beyond half the play on either side, and never a pull.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,6 +30,24 @@ impl Coupling {
     pub fn resonant(inertia: f64, frequency: f64, ratio: f64) -> Coupling {
         let omega = std::f64::consts::TAU * frequency;
         Coupling { stiffness: inertia * omega * omega, damping: 2.0 * ratio * inertia * omega, half_gap: 0.0 }
+    }
+
+    /// The angle that a torque is seen to hold, after an angle that was expected: play lies anywhere in its gap while hardly
+    /// any torque passes.
+    fn held_by(&self, torque: f64, expected: f64) -> f64 {
+        if torque.abs() > TAKEN_UP * self.stiffness * self.half_gap {
+            torque / self.stiffness + self.half_gap * torque.signum()
+        } else {
+            expected.clamp(-self.half_gap, self.half_gap)
+        }
+    }
+
+    /// Rate, 1/s, at which an angle is drawn to the one seen, so that the difference of the two dies away with all the
+    /// damping that an oscillation about `inertia` can have without a peak in its response.
+    fn pull(&self, inertia: f64) -> f64 {
+        let omega = (self.stiffness / inertia).sqrt();
+        let own = 0.5 * self.damping / (self.stiffness * inertia).sqrt();
+        2.0 * (FLAT - own).max(0.0) * omega
     }
 
     fn torque(&self, delta: f64, rate: f64) -> f64 {
@@ -54,7 +78,21 @@ impl WindUp {
     /// went with its motor; where the link's is, I is the rotor's and `drive` the effort less what the rotor takes to go
     /// with its link. Either way nothing is differentiated. `inertia` is kg m² (kg) sample by sample, `drive` N m (N).
     /// Semi-implicit Euler in steps of half a millisecond.
-    pub fn forced(drive: &[f64], inertia: &[f64], coupling: &Coupling, dt: f64) -> WindUp {
+    ///
+    /// Left to itself the oscillation rings with the noise of the drive, and play chatters as no simulation follows.
+    /// `seen` is the torque through the joint by the account of the other side of it: the angle is drawn to the one that it
+    /// shows (Luenberger, IEEE Trans. Autom. Control 16(6) 1971). A torque that a model lacks shows up in full all the
+    /// same, as the pull acts on what the angle does, not on what holds it.
+    ///
+    /// `slope` is how fast the drive falls as the angle grows, N m/rad, sample by sample: a link that sags has another weight.
+    pub fn forced(
+        drive: &[f64],
+        inertia: &[f64],
+        slope: Option<&[f64]>,
+        coupling: &Coupling,
+        dt: f64,
+        seen: Option<&[f64]>,
+    ) -> WindUp {
         let steps = (dt / STEP).ceil().max(1.0);
         let h = dt / steps;
         let first = drive.first().copied().unwrap_or(0.0);
@@ -68,15 +106,33 @@ impl WindUp {
         for (k, (&now, &inertia)) in drive.iter().zip(inertia).enumerate() {
             out.angle.push(angle);
             out.rate.push(rate);
-            out.acceleration.push((now - coupling.torque(angle, rate)) / inertia);
+            let slope = slope.map_or(0.0, |slope| slope[k]);
+            out.acceleration.push((now - slope * angle - coupling.torque(angle, rate)) / inertia);
             let next = drive.get(k + 1).copied().unwrap_or(now);
+            let seen = seen.map(|s| (s[k], s.get(k + 1).copied().unwrap_or(s[k])));
+            let pull = -(-h * coupling.pull(inertia)).exp_m1();
             for i in 0..steps as usize {
-                let drive = now + (next - now) * (i as f64 + 0.5) / steps;
-                rate += h * (drive - coupling.torque(angle, rate)) / inertia;
+                let part = (i as f64 + 0.5) / steps;
+                let drive = now + (next - now) * part;
+                rate += h * (drive - slope * angle - coupling.torque(angle, rate)) / inertia;
                 angle += h * rate;
+                if let Some((now, next)) = seen {
+                    angle += pull * (coupling.held_by(now + (next - now) * part, angle) - angle);
+                }
             }
         }
         out
+    }
+
+    /// Of a motor along the logged motion of its link: of the torque that `turning` the motor leaves and of the one `taken`
+    /// by the link, N m (N). A spring shows its angle by the torque that goes through it; a motor in its play by how it is
+    /// driven.
+    pub fn of_motor(turning: &[f64], taken: &[f64], rotor: f64, coupling: &Coupling, dt: f64) -> WindUp {
+        if coupling.half_gap > 0.0 && rotor > 0.0 {
+            return WindUp::forced(turning, &vec![rotor; turning.len()], None, coupling, dt, Some(taken));
+        }
+        let wound: Vec<f64> = taken.iter().map(|torque| torque / coupling.stiffness).collect();
+        WindUp::of(first_order(&wound, coupling.damping / coupling.stiffness, dt), dt)
     }
 
     /// Of an angle that is known.
@@ -85,11 +141,82 @@ impl WindUp {
     }
 }
 
+/// One joint along a run, its drive still open: what all else of a robot leaves of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointRun {
+    /// Effort delivered, N m (N).
+    pub delivered: Vec<f64>,
+    /// What a rigid drive without a rotor leaves of it, N m (N).
+    pub rest: Vec<f64>,
+    /// Acceleration, rad/s² (m/s²).
+    pub acceleration: Vec<f64>,
+    /// Inertia of the robot about the joint, kg m² (kg).
+    pub inertia: Vec<f64>,
+    /// How fast the torque that the robot takes about the joint grows with its angle, N m/rad (N/m).
+    pub slope: Vec<f64>,
+    /// Time from one sample to the next, s.
+    pub dt: f64,
+}
+
+impl JointRun {
+    /// What a drive leaves, N m (N): the elasticity or play of a candidate at its knob with a rotor of some inertia, kg m²
+    /// (kg), or a rigid one with that rotor where the candidate is of another kind. Play and spring to the side of the
+    /// transmission that the candidate has, as [`crate::Plant::residuals`] has them for this joint alone.
+    pub fn left_by(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
+        let turning = |k: usize| self.delivered[k] - rotor * self.acceleration[k];
+        let taken = |k: usize| self.delivered[k] - self.rest[k];
+        let all = 0..self.rest.len();
+        let (motor, link): (Vec<f64>, Vec<f64>) = all.clone().map(|k| (turning(k), taken(k))).unzip();
+        let (frequency, ratio) = CONTACT;
+        let coupling = match drive.kind {
+            Kind::JointElasticity => Coupling::resonant(drive.inertia, drive.shape, crate::joint_elasticity::RATIO),
+            Kind::Backlash => {
+                Coupling { half_gap: 0.5 * drive.shape, ..Coupling::resonant(drive.inertia, frequency, ratio) }
+            }
+            _ => return motor.iter().zip(&link).map(|(motor, link)| motor - link).collect(),
+        };
+        match drive.side {
+            EncoderSide::Motor => {
+                let slope = Some(&self.slope[..]);
+                let ahead = WindUp::forced(&link, &self.inertia, slope, &coupling, self.dt, Some(&motor));
+                let taken =
+                    |k: usize| link[k] - self.slope[k] * ahead.angle[k] - self.inertia[k] * ahead.acceleration[k];
+                all.map(|k| motor[k] - taken(k)).collect()
+            }
+            EncoderSide::Link => {
+                let ahead = WindUp::of_motor(&motor, &link, rotor, &coupling, self.dt);
+                all.map(|k| motor[k] - rotor * ahead.acceleration[k] - link[k]).collect()
+            }
+        }
+    }
+}
+
 /// Time between two evaluations of an inertia, s: it changes with the pose, and is linear between.
 const EVERY: f64 = 0.02;
 
+/// How fast the torque about one joint grows with its angle along a motion, the other joints as they are, sample by sample,
+/// N m/rad (N/m): by differences, as inverse dynamics is as good as linear over so little.
+pub(crate) fn slope_about(model: &Model, data: &mut Data, motion: &Motion, joint: usize) -> Vec<f64> {
+    let n = model.dof();
+    let [mut q, mut v, mut a, mut here, mut there] = std::array::from_fn(|_| vec![0.0; n]);
+    (0..motion.len())
+        .map(|k| {
+            for j in 0..n {
+                (q[j], v[j], a[j]) = (motion.q[j][k], motion.v[j][k], motion.a[j][k]);
+            }
+            model.inverse_dynamics(data, &q, &v, &a, &mut here);
+            q[joint] += NUDGE;
+            model.inverse_dynamics(data, &q, &v, &a, &mut there);
+            (there[joint] - here[joint]) / NUDGE
+        })
+        .collect()
+}
+
+/// Step of that difference, rad (m).
+const NUDGE: f64 = 1e-4;
+
 /// Inertia of a robot about one joint along a motion, the other joints held, sample by sample, kg m² (kg).
-pub(crate) fn inertia_about(model: &Model, data: &mut Data, motion: &Motion, joint: usize) -> Vec<f64> {
+pub fn inertia_about(model: &Model, data: &mut Data, motion: &Motion, joint: usize) -> Vec<f64> {
     let n = model.dof();
     let stride = ((EVERY / motion.dt) as usize).max(1);
     let (mut q, mut mass) = (vec![0.0; n], DMatrix::zeros(n, n));

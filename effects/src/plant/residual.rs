@@ -3,10 +3,7 @@
 use super::Plant;
 use crate::Motion;
 use crate::filter::{bristle, first_order, late};
-use crate::wind_up::{Coupling, WindUp, inertia_about};
-
-/// Times that the torque which winds a spring is computed again on the link's own motion, where the motor's is logged.
-const ROUNDS: usize = 1;
+use crate::wind_up::{Coupling, JointRun, WindUp, inertia_about, slope_about};
 
 /// What one sample needs to know beyond itself.
 #[derive(Default)]
@@ -42,34 +39,20 @@ impl Plant {
     /// sample does not show. Efforts are delayed and lagged, bristles bend, drives warm up and contacts push as the run has it.
     ///
     /// An elastic drive's motor turns ahead of its link by the wind-up δ, and its rotor takes J δ̈ more than with a rigid drive
-    /// (Spong, J. Dyn. Sys. 109(4) 1987). With the link's position logged, a spring is wound by the torque that the link is
-    /// seen to take, and play is crossed as the logged effort drives the rotor. With the motor's logged, the link swings
-    /// behind it as its inertia and the joint have it, and every joint takes the torque of that motion.
+    /// (Spong, J. Dyn. Sys. 109(4) 1987). With the link's position logged, a spring is wound by what the link is seen to take, and
+    /// play is crossed as the logged effort drives the rotor, drawn to the same. With the motor's logged, the link swings
+    /// behind it as its inertia and the joint have it, drawn to what the motor is seen to pass on, and every joint takes the torque
+    /// of that motion.
     pub fn residuals(&mut self, motion: &Motion) -> Vec<Vec<f64>> {
-        let tau: Vec<Vec<f64>> = motion
-            .tau
-            .iter()
-            .enumerate()
-            .map(|(j, x)| {
-                let (gain, bias, limit) = (self.actuation.gain[j], self.actuation.bias[j], self.actuation.limit[j]);
-                let mut x = x.clone();
-                if limit.is_finite() {
-                    x.iter_mut().zip(motion.cut(j, gain, bias, limit)).for_each(|(x, cut)| *x += cut / gain);
-                }
-                first_order(&late(&x, self.actuation.delay, motion.dt), self.actuation.lag, motion.dt)
-            })
-            .collect();
+        let tau = self.acting(motion);
         let bristles: Vec<Vec<f64>> =
             self.bristles.iter().map(|b| bristle(&motion.v[b.joint], b.stiffness / b.coulomb, motion.dt)).collect();
         let mut rest = self.run(motion, &tau, &bristles, &[]);
         let turns = |plant: &Plant, d: usize| plant.drives[d].rotor > 0.0 || plant.motor_encoders;
         if (0..self.drives.len()).any(|d| turns(self, d)) {
-            let mut turning = self.turning(motion, &tau, &rest, &[]);
+            let turning = self.turning(motion, &tau, &rest);
             if self.motor_encoders {
-                for _ in 0..ROUNDS {
-                    rest = self.run(motion, &tau, &bristles, &turning);
-                    turning = self.turning(motion, &tau, &rest, &turning);
-                }
+                rest = self.run(motion, &tau, &bristles, &turning);
             } else {
                 for drive in &turning {
                     for (rest, acceleration) in rest[drive.joint].iter_mut().zip(&drive.ahead.acceleration) {
@@ -82,6 +65,43 @@ impl Plant {
             row.iter_mut().for_each(|rest| *rest /= gain);
         }
         rest
+    }
+
+    /// Effort that acts in a measured run, limited, delayed and lagged, the gain not yet multiplied with.
+    fn acting(&self, motion: &Motion) -> Vec<Vec<f64>> {
+        let act = |(j, x): (usize, &Vec<f64>)| {
+            let (gain, bias, limit) = (self.actuation.gain[j], self.actuation.bias[j], self.actuation.limit[j]);
+            let mut x = x.clone();
+            if limit.is_finite() {
+                x.iter_mut().zip(motion.cut(j, gain, bias, limit)).for_each(|(x, cut)| *x += cut / gain);
+            }
+            first_order(&late(&x, self.actuation.delay, motion.dt), self.actuation.lag, motion.dt)
+        };
+        motion.tau.iter().enumerate().map(act).collect()
+    }
+
+    /// Every joint along a measured run, its drive still open: of a plant whose drives are rigid. Efforts, rests and
+    /// inertias are over the joint's gain, as the log's effort is.
+    pub fn joint_runs(&mut self, motion: &Motion) -> Vec<JointRun> {
+        let tau = self.acting(motion);
+        let rest = self.residuals(motion);
+        tau.into_iter()
+            .zip(rest)
+            .enumerate()
+            .map(|(j, (tau, rest))| {
+                let gain = self.actuation.gain[j];
+                let inertia = inertia_about(&self.model, &mut self.data, motion, j);
+                let slope = slope_about(&self.model, &mut self.data, motion, j);
+                JointRun {
+                    delivered: tau.iter().map(|&tau| self.actuation.at_joint(j, tau) / gain).collect(),
+                    rest,
+                    acceleration: motion.a[j].clone(),
+                    inertia: inertia.iter().map(|inertia| inertia / gain).collect(),
+                    slope: slope.iter().map(|slope| slope / gain).collect(),
+                    dt: motion.dt,
+                }
+            })
+            .collect()
     }
 
     /// One pass over a run, the gain not yet divided by, with links behind their logged motors.
@@ -111,8 +131,8 @@ impl Plant {
         out
     }
 
-    /// Wind-up of every drive; `before` as it was taken to be when `rest` was computed, where the motors are logged.
-    fn turning(&mut self, motion: &Motion, tau: &[Vec<f64>], rest: &[Vec<f64>], before: &[Turning]) -> Vec<Turning> {
+    /// Wind-up of every drive, from what links take that go with their motors.
+    fn turning(&mut self, motion: &Motion, tau: &[Vec<f64>], rest: &[Vec<f64>]) -> Vec<Turning> {
         (0..self.drives.len())
             .map(|d| {
                 let drive = &self.drives[d];
@@ -121,19 +141,16 @@ impl Plant {
                     Coupling { stiffness: drive.stiffness, damping: drive.damping, half_gap: drive.half_gap };
                 let delivered = |k: usize| self.actuation.at_joint(j, tau[j][k]);
                 // The torque that the link takes: the effort less the rest and the rotor's part.
-                let link = |k: usize| delivered(k) - rest[j][k] - rotor * motion.a[j][k];
+                let taken: Vec<f64> =
+                    (0..motion.len()).map(|k| delivered(k) - rest[j][k] - rotor * motion.a[j][k]).collect();
+                // The torque that the motor passes on.
+                let turning: Vec<f64> = (0..motion.len()).map(|k| delivered(k) - rotor * motion.a[j][k]).collect();
                 let ahead = if self.motor_encoders {
                     let inertia = inertia_about(&self.model, &mut self.data, motion, j);
-                    let forced: Vec<f64> = (0..motion.len())
-                        .map(|k| link(k) + before.get(d).map_or(0.0, |b| inertia[k] * b.ahead.acceleration[k]))
-                        .collect();
-                    WindUp::forced(&forced, &inertia, &coupling, motion.dt)
-                } else if coupling.half_gap > 0.0 && rotor > 0.0 {
-                    let forced: Vec<f64> = (0..motion.len()).map(|k| delivered(k) - rotor * motion.a[j][k]).collect();
-                    WindUp::forced(&forced, &vec![rotor; motion.len()], &coupling, motion.dt)
+                    let slope = slope_about(&self.model, &mut self.data, motion, j);
+                    WindUp::forced(&taken, &inertia, Some(&slope), &coupling, motion.dt, Some(&turning))
                 } else {
-                    let wound: Vec<f64> = (0..motion.len()).map(|k| link(k) / coupling.stiffness).collect();
-                    WindUp::of(first_order(&wound, coupling.damping / coupling.stiffness, motion.dt), motion.dt)
+                    WindUp::of_motor(&turning, &taken, rotor, &coupling, motion.dt)
                 };
                 Turning { joint: j, rotor, ahead }
             })

@@ -1,0 +1,342 @@
+//! Whether a joint's motor turns on its own: springs and play in the drives, each tried at its exact law.
+//!
+//! Their torque is not linear in stiffness or gap, not even nearly: a resonance moves, an impact comes earlier. So each joint
+//! is looked at alone, all else of the robot along its measured motion, and each account of its drive is turned to where it
+//! leaves least. An account that swings with the noise of the position also explains some of it; what noise alone would
+//! leave is found by a second run with more of it, and taken off (a simulation of the error in the variables, Cook and
+//! Stefanski, J. Am. Stat. Assoc. 89(428) 1994).
+
+use crate::band::Row;
+use crate::corrected::{aligned, plant_pushed};
+use crate::diagnose::Logs;
+use crate::floor::noise_floor;
+use crate::kernel::apply;
+use crate::signals::{Signals, derivative_kernel};
+use gapscope_effects::{Candidate, Effect, EffectError, EncoderSide, JointRun, Kind};
+use nalgebra::{Matrix2, Vector2};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+/// Resonances of the link on its locked motor that are tried first, Hz.
+const RESONANCE: [f64; 4] = [2.2, 3.6, 6.0, 10.0];
+/// Gaps that are tried first, rad or m.
+const GAP: [f64; 5] = [0.004, 0.009, 0.018, 0.035, 0.07];
+/// Steps of the search for the best knob and rotor, relative: the first, and where it ends.
+const STEPS: (f64, f64) = (0.2, 0.004);
+/// Gauss–Newton steps from each first try, and the farthest that one goes, relative.
+const DESCENTS: usize = 3;
+const FARTHEST: f64 = 0.5;
+/// Moves of that search, at most.
+const MOVES: usize = 40;
+/// A drive is not rigid where an account of it leaves less in so many more blocks of time that tell, over their root (the
+/// sign test: a burst of chatter is one block), ...
+const BEYOND_DOUBT: f64 = 1.5;
+/// ... and this part of the mean square, or less.
+const PART: f64 = 0.85;
+/// Part of the noise, and of the effort, below which what is left of a block of time is as good as nothing.
+const OF_NOISE: f64 = 0.25;
+const OF_EFFORT: f64 = 1e-3;
+/// Resonances, Hz, between which a spring is one that somebody would build and that these logs could show.
+const SOFTEST: f64 = 1.5;
+const STIFFEST: f64 = 20.0;
+/// A rotor lighter than this part of what it turns would not show.
+const LIGHTEST: f64 = 0.05;
+/// One block in so many must show something at all.
+const RARE: usize = 10;
+const SEED: u64 = 5;
+
+/// An account of one joint's drive that leaves less than a rigid one.
+#[derive(Debug, Clone)]
+pub(crate) struct Account {
+    /// Spring or play at the knob found.
+    pub drive: Candidate,
+    /// By how many standard errors it is better.
+    pub beyond: f64,
+}
+
+/// One joint in all logs, and the same with more noise.
+struct Study<'a> {
+    logs: &'a Logs<'a>,
+    joint: usize,
+    runs: Vec<&'a JointRun>,
+    noisier: Vec<JointRun>,
+    /// Mean square that counts as nothing, (N m)².
+    nothing: f64,
+    /// Mean square of the noise in each block as a rigid drive has it, (N m)².
+    noise: Vec<f64>,
+    /// Inertia of the robot about the joint, kg m² (kg).
+    inertia: f64,
+}
+
+impl Logs<'_> {
+    /// The best account of each joint's drive that is better than a rigid one, beside other effects; best first.
+    pub(crate) fn accounts(
+        &self,
+        others: &[Effect],
+        side: EncoderSide,
+        alignment: f64,
+    ) -> Result<Vec<Account>, EffectError> {
+        let runs: Vec<Vec<JointRun>> = self
+            .signals
+            .par_iter()
+            .map(|s| {
+                let mut plant = plant_pushed(self.model, others, side, s.dt, &s.pushed)?;
+                Ok(aligned(self.model, s, &self.still, alignment, |motion| plant.joint_runs(motion)))
+            })
+            .collect::<Result<_, EffectError>>()?;
+        let moving: Vec<usize> = (0..self.model.dof()).filter(|&j| self.moving[j]).collect();
+        let mut found: Vec<Account> =
+            moving.into_par_iter().filter_map(|j| Study::new(self, &runs, j).best()).collect();
+        found.sort_by(|a, b| b.beyond.total_cmp(&a.beyond));
+        Ok(found)
+    }
+}
+
+impl<'a> Study<'a> {
+    fn new(logs: &'a Logs<'a>, runs: &'a [Vec<JointRun>], joint: usize) -> Study<'a> {
+        let runs: Vec<&JointRun> = runs.iter().map(|joints| &joints[joint]).collect();
+        let inertia = mean(&runs.iter().map(|run| mean(&run.inertia)).collect::<Vec<_>>());
+        let mut study = Study { logs, joint, runs, noisier: Vec::new(), nothing: 0.0, noise: Vec::new(), inertia };
+        let rigid = Candidate::new(Kind::Armature, vec![joint]);
+        let rotor = study.rotor(&rigid, 0.0);
+        let rest: Vec<Vec<f64>> = study.runs.iter().map(|run| run.left_by(&rigid, rotor)).collect();
+        // What is white of the effort, and not taken up by the motion, is noise of its measurement.
+        let alone: Vec<Vec<Vec<f64>>> = rest.iter().map(|rest| vec![rest.clone()]).collect();
+        let floor = noise_floor(&logs.signals, &logs.band, &alone, 1, 0.0)[0];
+        let white = |s: &Signals| {
+            let left = floor / (2.0 * logs.band.cutoff * s.raw.dt).sqrt();
+            left.min(s.effort_noise[joint])
+        };
+        study.noisier = logs
+            .signals
+            .iter()
+            .zip(&study.runs)
+            .enumerate()
+            .map(|(e, (s, run))| {
+                let seed = SEED.wrapping_add((e * logs.model.dof() + joint) as u64);
+                noisier(s, run, s.position_noise[joint], white(s), seed)
+            })
+            .collect();
+        study.noise = study.mean_squares(&study.noise_in(&rest, &rigid, rotor));
+        let effort = mean(&logs.signals.iter().map(|s| mean_square(&s.tau[joint])).collect::<Vec<_>>());
+        study.nothing = OF_NOISE * mean(&study.noise) + OF_EFFORT * OF_EFFORT * effort;
+        study
+    }
+
+    fn best(&self) -> Option<Account> {
+        let rigid = Candidate::new(Kind::Armature, vec![self.joint]);
+        let rotor = self.rotor(&rigid, 0.0);
+        let (_, rigid_rotor) = self.turn(rigid.clone(), rotor);
+        let without = self.left(&rigid, rigid_rotor);
+        if without.iter().filter(|left| **left > 2.0 * self.nothing).count() * RARE < without.len() {
+            return None;
+        }
+        let rigid_measure = self.measure(&rigid, rigid_rotor);
+        let mut best: Option<(f64, Candidate, f64)> = None;
+        for side in [EncoderSide::Link, EncoderSide::Motor] {
+            for (kind, grid) in [(Kind::JointElasticity, &RESONANCE[..]), (Kind::Backlash, &GAP)] {
+                let at = |shape: f64| Candidate {
+                    shape,
+                    side,
+                    inertia: self.inertia,
+                    ..Candidate::new(kind, vec![self.joint])
+                };
+                let first = grid
+                    .iter()
+                    .map(|&shape| self.descend(at(shape), self.rotor(&at(shape), rigid_rotor)))
+                    .map(|(drive, rotor)| (self.measure(&drive, rotor), drive, rotor))
+                    .min_by(|a, b| a.0.total_cmp(&b.0));
+                let Some((_, first, rotor)) = first.filter(|(least, ..)| *least < rigid_measure) else { continue };
+                let (drive, rotor) = self.turn(first, rotor);
+                let measure = self.measure(&drive, rotor);
+                if best.as_ref().is_none_or(|(least, ..)| measure < *least) {
+                    best = Some((measure, drive, rotor));
+                }
+            }
+        }
+        let (_, drive, rotor) = best?;
+        let with = self.left(&drive, rotor);
+        let gain = mean(&without.iter().zip(&with).map(|(r, d)| (r / d).ln()).collect::<Vec<_>>());
+        let telling: Vec<(f64, f64)> =
+            without.iter().copied().zip(with.iter().copied()).filter(|(r, d)| r.max(*d) > 2.0 * self.nothing).collect();
+        let better: f64 = telling.iter().map(|(r, d)| if r > d { 1.0 } else { -1.0 }).sum();
+        let beyond = better / (telling.len().max(1) as f64).sqrt();
+        // At the edge of what a drive can be, it stands in for something else.
+        let possible = rotor > 1.1 * LIGHTEST * self.inertia
+            && (drive.kind != Kind::JointElasticity || (SOFTEST..STIFFEST).contains(&drive.shape));
+        let knob_error = self.error(&drive, rotor);
+        (possible && beyond > BEYOND_DOUBT && (gain > -PART.ln() || mean(&with) < PART * mean(&without)))
+            .then_some(Account { drive: Candidate { knob_error, ..drive }, beyond })
+    }
+
+    /// The rotor with which a drive leaves least, by least squares from one nearby: more of it takes as much as the joint
+    /// accelerates, whatever the drive does beside.
+    fn rotor(&self, drive: &Candidate, near: f64) -> f64 {
+        let (mut product, mut square) = (0.0, 0.0);
+        for run in &self.runs {
+            for (rest, a) in run.left_by(drive, near).iter().zip(&run.acceleration) {
+                product += rest * a;
+                square += a * a;
+            }
+        }
+        let step = if square > 0.0 { product / square } else { 0.0 };
+        (near + step).max(LIGHTEST * self.inertia)
+    }
+
+    /// Knob and rotor of a drive after some Gauss–Newton steps in compliance or gap, in which what is left is nearly linear;
+    /// blocks count by what is left of them.
+    fn descend(&self, mut drive: Candidate, mut rotor: f64) -> (Candidate, f64) {
+        let power = if drive.kind == Kind::JointElasticity { -0.5 } else { 1.0 };
+        for _ in 0..DESCENTS {
+            let rest = self.rows(&drive, rotor);
+            let mut size = vec![(0.0, 0.0); self.logs.band.blocks];
+            for (row, rest) in self.logs.band.rows.iter().zip(&rest) {
+                size[row.block].0 += rest * rest;
+                size[row.block].1 += 1.0;
+            }
+            let weight = |row: &Row| 1.0 / (size[row.block].0 / size[row.block].1 + self.nothing);
+            let by = 1.0 + STEPS.1;
+            let knob = self.rows(&Candidate { shape: drive.shape * by.powf(power), ..drive.clone() }, rotor);
+            let motor = self.rows(&drive, rotor * by);
+            let mut gram = Matrix2::zeros();
+            let mut moment = Vector2::zeros();
+            for (i, row) in self.logs.band.rows.iter().enumerate() {
+                let slope = Vector2::new(knob[i] - rest[i], motor[i] - rest[i]) / STEPS.1;
+                gram += weight(row) * slope * slope.transpose();
+                moment -= weight(row) * slope * rest[i];
+            }
+            let Some(step) = gram.lu().solve(&moment).filter(|step| step.iter().all(|x| x.is_finite())) else { break };
+            let bounded = |step: f64| 1.0 + step.clamp(-FARTHEST, FARTHEST);
+            drive.shape *= bounded(step[0]).powf(power);
+            rotor = (rotor * bounded(step[1])).max(LIGHTEST * self.inertia);
+        }
+        (drive, rotor)
+    }
+
+    /// What a drive leaves at the rows of the band.
+    fn rows(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
+        let band = &self.logs.band;
+        self.runs.iter().enumerate().flat_map(|(e, run)| band.filter(e, &run.left_by(drive, rotor))).collect()
+    }
+
+    /// Knob and rotor where a drive leaves least: a search along the two in steps that become smaller.
+    fn turn(&self, drive: Candidate, rotor: f64) -> (Candidate, f64) {
+        let mut best = (self.measure(&drive, rotor), drive, rotor);
+        let mut step = STEPS.0;
+        for _ in 0..MOVES {
+            if step < STEPS.1 {
+                break;
+            }
+            let mut tries = vec![(1.0, 1.0 + step), (1.0, 1.0 / (1.0 + step))];
+            if best.1.shape > 0.0 {
+                tries.extend([(1.0 + step, 1.0), (1.0 / (1.0 + step), 1.0)]);
+            }
+            let next = tries
+                .into_iter()
+                .map(|(knob, by)| (Candidate { shape: knob * best.1.shape, ..best.1.clone() }, by * best.2))
+                .filter(|(_, rotor)| *rotor >= LIGHTEST * self.inertia)
+                .map(|(drive, rotor)| (self.measure(&drive, rotor), drive, rotor))
+                .find(|next| next.0 < best.0);
+            match next {
+                Some(next) => best = next,
+                None => step /= 2.0,
+            }
+        }
+        (best.1, best.2)
+    }
+
+    /// Mean logarithm of what is left of the blocks: a burst of chatter counts as one block that is off.
+    fn measure(&self, drive: &Candidate, rotor: f64) -> f64 {
+        let left: Vec<f64> = self.left(drive, rotor).into_iter().map(f64::ln).collect();
+        let mean = mean(&left);
+        if mean.is_finite() { mean } else { f64::INFINITY }
+    }
+
+    /// Mean square of each block that a drive leaves beyond noise and nothing, (N m)².
+    fn left(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
+        let rest: Vec<Vec<f64>> = self.runs.iter().map(|run| run.left_by(drive, rotor)).collect();
+        let noise = self.mean_squares(&self.noise_in(&rest, drive, rotor));
+        self.mean_squares(&rest)
+            .into_iter()
+            .zip(noise)
+            .zip(&self.noise)
+            // Play is so sensitive that noise might account for all of it: no more is taken off than of a rigid drive.
+            .map(|((left, noise), rigid)| (left - noise.min(*rigid)).max(0.0) + self.nothing)
+            .collect()
+    }
+
+    /// What more noise changes of a rest.
+    fn noise_in(&self, rest: &[Vec<f64>], drive: &Candidate, rotor: f64) -> Vec<Vec<f64>> {
+        let change = |(run, rest): (&JointRun, &Vec<f64>)| {
+            run.left_by(drive, rotor).iter().zip(rest).map(|(noisier, rest)| noisier - rest).collect()
+        };
+        self.noisier.iter().zip(rest).map(change).collect()
+    }
+
+    /// Of every block that has rows.
+    fn mean_squares(&self, rest: &[Vec<f64>]) -> Vec<f64> {
+        let band = &self.logs.band;
+        let mut sums = vec![(0.0, 0usize); band.blocks];
+        for (e, rest) in rest.iter().enumerate() {
+            for (i, x) in band.of_episode[e].clone().zip(band.filter(e, rest)) {
+                let (sum, count) = &mut sums[band.rows[i].block];
+                *sum += x * x;
+                *count += 1;
+            }
+        }
+        sums.into_iter().filter(|(_, count)| *count > 0).map(|(sum, count)| sum / count as f64).collect()
+    }
+
+    /// Standard error of the knob, the rotor free: sandwich over blocks.
+    fn error(&self, drive: &Candidate, rotor: f64) -> f64 {
+        let rows = |drive: &Candidate, rotor: f64| self.rows(drive, rotor);
+        let rest = rows(drive, rotor);
+        let slope = |step: f64, moved: Vec<f64>, back: Vec<f64>| -> Vec<f64> {
+            moved.iter().zip(&back).map(|(m, b)| (m - b) / (2.0 * step)).collect()
+        };
+        let by = STEPS.1 * drive.shape;
+        let knob = |by: f64| rows(&Candidate { shape: drive.shape + by, ..drive.clone() }, rotor);
+        let knob = slope(by, knob(by), knob(-by));
+        let by = STEPS.1 * rotor;
+        let rotor = slope(by, rows(drive, rotor + by), rows(drive, rotor - by));
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        // The knob's slope less what the rotor could make up for.
+        let part = dot(&knob, &rotor) / dot(&rotor, &rotor).max(f64::MIN_POSITIVE);
+        let own: Vec<f64> = knob.iter().zip(&rotor).map(|(k, r)| k - part * r).collect();
+        let mut scores = vec![0.0; self.logs.band.blocks];
+        for (row, (own, rest)) in self.logs.band.rows.iter().zip(own.iter().zip(&rest)) {
+            scores[row.block] += own * rest;
+        }
+        dot(&scores, &scores).sqrt() / dot(&own, &own).max(f64::MIN_POSITIVE)
+    }
+}
+
+/// A run in which a joint's position and effort have noise of some standard deviation once more.
+fn noisier(s: &Signals, run: &JointRun, position: f64, effort: f64, seed: u64) -> JointRun {
+    let kernel = derivative_kernel(s.raw.dt);
+    let mut random = Pcg64::seed_from_u64(seed);
+    let samples = s.raw.position.first().map_or(0, Vec::len);
+    let mut white = |deviation: f64| -> Vec<f64> {
+        (0..samples).map(|_| deviation * random.sample::<f64, _>(StandardNormal)).collect()
+    };
+    let (position, effort) = (white(position), white(effort));
+    let mut noisier = run.clone();
+    for k in 0..run.rest.len() {
+        let from = s.first + k * s.stride - kernel.reach;
+        let (acceleration, effort) = (apply(&kernel.second, &position, from), apply(&kernel.value, &effort, from));
+        noisier.acceleration[k] += acceleration;
+        noisier.delivered[k] += effort;
+        noisier.rest[k] += effort - run.inertia[k] * acceleration;
+    }
+    noisier
+}
+
+fn mean(x: &[f64]) -> f64 {
+    x.iter().sum::<f64>() / x.len().max(1) as f64
+}
+
+fn mean_square(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64
+}

@@ -42,7 +42,7 @@ pub enum Command {
 pub enum Withheld {
     /// Make a bank of cases; an interrupted one is gone on with
     Make(MakeBank),
-    /// Diagnose the cases of a bank, then open the sealed truth
+    /// Diagnose the cases of banks, then open the sealed truth
     Score(ScoreBank),
 }
 
@@ -442,8 +442,9 @@ pub enum Level {
 /// Arguments of `withheld score`.
 #[derive(Debug, Args)]
 pub struct ScoreBank {
-    /// Folder of cases; what is sealed lies in a folder beside it, `.sealed` behind its name
-    pub bank: PathBuf,
+    /// Folders of cases, counted apart and together; what is sealed lies in a folder beside each, `.sealed` behind its name
+    #[arg(required = true, value_name = "BANK")]
+    pub banks: Vec<PathBuf>,
     /// Binary to score [default: this one]
     #[arg(long, value_name = "FILE")]
     pub exe: Option<PathBuf>,
@@ -456,7 +457,7 @@ pub struct ScoreBank {
     /// Print one JSON object and nothing else
     #[arg(long)]
     pub json: bool,
-    /// Folder for score.json and score.html
+    /// Folder for score.json, score.html, and score.md with its pictures
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Replace results that are in the folder already

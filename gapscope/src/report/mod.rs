@@ -12,7 +12,7 @@ mod joints;
 mod power;
 mod rest;
 mod rollout;
-mod score;
+pub mod score;
 mod series;
 mod shrink;
 pub mod terminal;
@@ -34,7 +34,6 @@ pub use format::{
 };
 pub use power::line as power_line;
 pub use rollout::page as rollout_page;
-pub use score::html as score;
 pub use words::{
     capital, effect, implied_unit, interval, joints as joint_list, learnable, motion_unit, outstanding, regime,
     said_of, verdict,

@@ -24,7 +24,7 @@ const STYLE: &str = ".picture{background:#fff;color:#16191d;font:13px system-ui,
 .picture text{fill:currentColor}.picture .small{font-size:11.5px}\
 .picture .s0{--c:#0068a8}.picture .s1{--c:#c75300}.picture .s2{--c:#8a6fa8}.picture .s3{--c:#00724f}.picture .s4{--c:#a3273b}\
 .picture .s5{--c:#707a85}.picture .s6{--c:#8f5b00}.picture path{fill:none;stroke:var(--c);stroke-width:2;stroke-linejoin:round}\
-.picture .fine path{stroke-width:1.3}.picture .dashed{stroke-dasharray:6 5}.picture circle,.picture rect.key{fill:var(--c)}\
+.picture .fine path{stroke-width:1.3}.picture .dashed{stroke-dasharray:6 5}.picture circle,.picture rect.legend-key{fill:var(--c)}\
 .picture .rule{stroke:#5b636d;stroke-dasharray:3 3}.picture .cell{fill:rgb(var(--heat)/calc(var(--a)*var(--top)));stroke:#e4e7ea}\
 .picture .framed{fill:none;stroke:currentColor;stroke-width:2}\
 @media(prefers-color-scheme:dark){.picture{background:#14171a;color:#e8eaed;--heat:235 120 40}.picture .grid,.picture .cell{stroke:#2b3036}\
@@ -95,7 +95,7 @@ pub fn panels(title: &str, panels: &[Panel]) -> String {
             @for (i, name) in names.iter().enumerate() {
                 @let (h, v) = place(i);
                 g class={ "s" (i % COLOURS) } {
-                    rect.key x=(number(left + h)) y=(number(v - 8.0)) width="14" height="8" rx="1" {}
+                    rect.legend-key x=(number(left + h)) y=(number(v - 8.0)) width="14" height="8" rx="1" {}
                     text x=(number(left + h + LEGEND[2])) y=(number(v)) { (name) }
                 }
             }
@@ -151,7 +151,7 @@ fn frame(panel: &Panel, [left, top]: [f64; 2], [across, down]: [f64; 2], names: 
         @for (value, label) in &panel.rules {
             @let (at, _) = place([*value, y.range()[0]]);
             line.rule x1=(number(at)) x2=(number(at)) y1=(number(top)) y2=(number(bottom)) {}
-            text.muted.small x=(number(at + 5.0)) y=(number(bottom - 7.0)) { (label) }
+            text.muted.small x=(number(at)) y=(number(top - 4.0)) text-anchor="middle" { (label) }
         }
         @for one in panel.series.iter().rev() { g class={ "s" (colour(&one.name)) } { (marks(one, &place, top)) } }
     }
@@ -213,7 +213,7 @@ mod tests {
         let axis = || Axis::tight([0.0, 1.0], "", 2);
         let panel = |title: &str, series| Panel { title: title.into(), x: axis(), y: axis(), series, rules: vec![] };
         let text = panels("both", &[panel("p", vec![one("a"), one("b")]), panel("q", vec![one("b")])]);
-        assert_eq!(text.matches("class=\"key\"").count(), 2, "{text}");
+        assert_eq!(text.matches("class=\"legend-key\"").count(), 2, "{text}");
         assert_eq!((text.matches("class=\"s0\"").count(), text.matches("class=\"s1\"").count()), (2, 3), "{text}");
     }
 

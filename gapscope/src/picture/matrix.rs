@@ -3,10 +3,11 @@
 use super::{file, number};
 use maud::html;
 
-/// Height of a row, least width of a column, width of a character of a name at most.
+/// Height of a row, least width of a column, width of a character of a name and of the title at most.
 const ROW: f64 = 25.0;
 const COLUMN: f64 = 27.0;
 const CHARACTER: f64 = 6.9;
+const TITLE: f64 = 9.0;
 /// Names of columns stand at this slope: sine and cosine of 45°.
 const SLOPE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
@@ -52,9 +53,13 @@ impl Matrix<'_> {
         let right = left + column * self.columns.len() as f64;
         let bottom = top + ROW * self.rows.len() as f64;
         // The last names lean over the right edge.
-        let lean = SLOPE * reach(self.columns) + 8.0 - 0.5 * column;
+        let end = |(j, name): (usize, &String)| {
+            left + column * (j as f64 + 0.5) + SLOPE * CHARACTER * name.chars().count() as f64
+        };
+        let lean = self.columns.iter().enumerate().map(end).fold(right, f64::max) + 16.0;
         let note = 16.0 + 6.4 * self.note.chars().count() as f64 + 16.0;
-        let width = (right + lean.max(16.0)).max(note).max(420.0).ceil();
+        let title = 16.0 + TITLE * self.title.chars().count() as f64 + 16.0;
+        let width = lean.max(note).max(title).ceil();
         let at = |i: usize, j: usize| (left + column * j as f64, top + ROW * i as f64);
         file(
             self.title,

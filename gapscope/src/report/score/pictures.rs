@@ -55,11 +55,7 @@ pub fn calibration(score: &Score) -> String {
         ..Series::default()
     };
     let title = match score.totals.calibration_error {
-        Some(error) => format!(
-            "Confidence against truth: expected calibration error {} over {} effects named",
-            figure(error),
-            score.totals.reported_effects
-        ),
+        Some(error) => format!("Confidence against truth: expected calibration error {}", figure(error)),
         None => "Confidence against truth: no effect was named".into(),
     };
     let (x, y) = (Axis::tight([0.0, 1.0], "confidence", 5), Axis::tight([0.0, 1.0], "share that is there", 5));

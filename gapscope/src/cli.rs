@@ -153,6 +153,22 @@ pub enum Study {
     Structure(Learning),
     /// Learning: data from the controller in use against data from elsewhere
     Policy(Learning),
+    /// Logs of real machines: what is found, against what was published
+    RealLogs(RealLogs),
+}
+
+/// Arguments of `study real-logs`.
+#[derive(Debug, Args)]
+pub struct RealLogs {
+    /// Folder of the logs, a folder each: emps, tx40, kinova_gen3, double_pendulum
+    #[arg(long, value_name = "DIR")]
+    pub data: PathBuf,
+    /// Folder for the pages and their pictures
+    #[arg(long, default_value = "docs/real", value_name = "DIR")]
+    pub out: PathBuf,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Arguments of `study closed-loop`.

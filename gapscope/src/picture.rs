@@ -12,7 +12,7 @@ use std::fmt::Write;
 const WIDTH: [f64; 2] = [720.0, 900.0];
 /// Height of a panel's frame in either.
 const DOWN: [f64; 2] = [290.0, 150.0];
-/// Around a frame: left, right, above (twice that with a title), below.
+/// Around a frame: left, right, above (twice that with a title or a rule), below.
 const MARGIN: [f64; 4] = [70.0, 24.0, 14.0, 52.0];
 /// First line of the legend, distance of its lines, width of a key, and of a character at most.
 const LEGEND: [f64; 4] = [44.0, 18.0, 20.0, 7.2];
@@ -83,7 +83,8 @@ pub fn panels(title: &str, panels: &[Panel]) -> String {
     let (width, [left, right, above, below]) = (WIDTH[several], MARGIN);
     let place = legend(&names, width - left - right);
     let top = place(names.len().saturating_sub(1)).1;
-    let titled = if panels.iter().any(|panel| !panel.title.is_empty()) { above } else { 0.0 };
+    let crowned = panels.iter().any(|panel| !panel.title.is_empty() || !panel.rules.is_empty());
+    let titled = if crowned { above } else { 0.0 };
     let size = [(width / (several + 1) as f64) - left - right, DOWN[several]];
     let row = above + titled + size[1] + below;
     let at = |i: usize| [(i % 2) as f64 * (left + size[0] + right) + left, top + row * (i / 2) as f64 + above + titled];
@@ -151,7 +152,7 @@ fn frame(panel: &Panel, [left, top]: [f64; 2], [across, down]: [f64; 2], names: 
         @for (value, label) in &panel.rules {
             @let (at, _) = place([*value, y.range()[0]]);
             line.rule x1=(number(at)) x2=(number(at)) y1=(number(top)) y2=(number(bottom)) {}
-            text.muted.small x=(number(at)) y=(number(top - 4.0)) text-anchor="middle" { (label) }
+            text.muted.small x=(number(at)) y=(number(top - 5.0)) text-anchor=(if x.place(*value) < 0.8 { "start" } else { "end" }) { (label) }
         }
         @for one in panel.series.iter().rev() { g class={ "s" (colour(&one.name)) } { (marks(one, &place, top)) } }
     }

@@ -42,7 +42,7 @@ pub enum Command {
 pub enum Withheld {
     /// Make a bank of cases; an interrupted one is gone on with
     Make(MakeBank),
-    /// Diagnose the cases of a bank, then open the sealed truth
+    /// Diagnose the cases of banks, then open the sealed truth
     Score(ScoreBank),
 }
 
@@ -153,6 +153,22 @@ pub enum Study {
     Structure(Learning),
     /// Learning: data from the controller in use against data from elsewhere
     Policy(Learning),
+    /// Logs of real machines: what is found, against what was published
+    RealLogs(RealLogs),
+}
+
+/// Arguments of `study real-logs`.
+#[derive(Debug, Args)]
+pub struct RealLogs {
+    /// Folder of the logs, a folder each: emps, tx40, kinova_gen3, double_pendulum
+    #[arg(long, value_name = "DIR")]
+    pub data: PathBuf,
+    /// Folder for the pages and their pictures
+    #[arg(long, default_value = "docs/real", value_name = "DIR")]
+    pub out: PathBuf,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Arguments of `study closed-loop`.
@@ -442,8 +458,9 @@ pub enum Level {
 /// Arguments of `withheld score`.
 #[derive(Debug, Args)]
 pub struct ScoreBank {
-    /// Folder of cases; what is sealed lies in a folder beside it, `.sealed` behind its name
-    pub bank: PathBuf,
+    /// Folders of cases, counted apart and together; what is sealed lies in a folder beside each, `.sealed` behind its name
+    #[arg(required = true, value_name = "BANK")]
+    pub banks: Vec<PathBuf>,
     /// Binary to score [default: this one]
     #[arg(long, value_name = "FILE")]
     pub exe: Option<PathBuf>,
@@ -456,7 +473,7 @@ pub struct ScoreBank {
     /// Print one JSON object and nothing else
     #[arg(long)]
     pub json: bool,
-    /// Folder for score.json and score.html
+    /// Folder for score.json, score.html, and score.md with its pictures
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Replace results that are in the folder already

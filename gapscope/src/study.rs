@@ -2,6 +2,7 @@
 
 mod closed_loop;
 mod learning;
+mod real_logs;
 
 use crate::cli::Study;
 use anyhow::Result;
@@ -18,5 +19,6 @@ pub fn run(study: &Study) -> Result<String> {
         Study::Region(args) => learning::run(Topic::Region, args),
         Study::Structure(args) => learning::run(Topic::Structure, args),
         Study::Policy(args) => learning::run(Topic::Policy, args),
+        Study::RealLogs(args) => real_logs::run(args),
     }
 }

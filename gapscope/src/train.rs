@@ -199,8 +199,7 @@ fn write(out: &std::path::Path, network: &Mlp<f32>, history: &[Epoch], record: &
     let line = |name: &str, of: &dyn Fn(&Epoch) -> f64| Series {
         name: name.into(),
         points: history.iter().map(|e| [e.epoch as f64, of(e)]).collect(),
-        dashed: false,
-        dots: false,
+        ..Series::default()
     };
     let series = [line("training rows", &|e| e.train), line("held out", &|e| e.held_out.unwrap_or(f64::NAN))];
     let x = Axis::tight([0.0, history.len() as f64], "epoch", 6);

@@ -182,8 +182,16 @@ fn a_bank_is_scored() {
     let written: Value = serde_json::from_slice(&fs::read(out.join("score.json")).unwrap()).unwrap();
     assert_eq!(written, json);
     assert!(fs::read_to_string(out.join("score.html")).unwrap().starts_with("<!DOCTYPE html>"));
+    let page = fs::read_to_string(out.join("score.md")).unwrap();
+    for picture in ["confusion.svg", "calibration.svg", "size.svg"] {
+        assert!(page.contains(&format!("]({picture})")), "{picture}");
+        assert!(fs::read_to_string(out.join(picture)).unwrap().starts_with("<svg xmlns"), "{picture}");
+    }
 
     refused(&score(&bank, &["--out", out.to_str().unwrap()]), &["score.json", "--force"]);
+    fs::remove_file(out.join("score.json")).unwrap();
+    refused(&score(&bank, &["--out", out.to_str().unwrap()]), &["score.html", "--force"]);
+    fs::write(out.join("score.json"), scored.stdout.trim_ascii_end()).unwrap();
     assert_eq!(fs::read(out.join("score.json")).unwrap(), scored.stdout.trim_ascii_end());
 }
 
@@ -210,4 +218,31 @@ fn a_bank_without_its_truth_and_binaries_that_do_not_answer_are_told() {
     fs::remove_dir_all(sealed(&bank)).unwrap();
     refused(&score(&bank, &[]), &["bank.sealed is missing"]);
     refused(&score(folder.path(), &[]), &["holds no case"]);
+}
+
+#[test]
+fn banks_are_counted_apart_and_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let bank = small(folder.path());
+    let other = folder.path().join("other");
+    let mut settings = SMALL;
+    settings[15] = "6";
+    assert!(make(&other, &settings, "2").status.success());
+    // No answers: what is counted is cases.
+    let names = [other.to_str().unwrap(), "--exe", "/bin/false"];
+    let out = folder.path().join("out");
+    let scored = score(&bank, &[&names[..], &["--json", "--out", out.to_str().unwrap()]].concat());
+    assert!(scored.status.success(), "{}", String::from_utf8_lossy(&scored.stderr));
+    let json: Value = serde_json::from_slice(&scored.stdout).unwrap();
+    let banks: Vec<&str> = json["banks"].as_array().unwrap().iter().map(|b| b["bank"].as_str().unwrap()).collect();
+    assert_eq!(banks, ["bank", "other"]);
+    let none = |totals: &Value| totals["none"]["n"].as_u64().unwrap();
+    assert_eq!((none(&json["totals"]), none(&json["banks"][0]["totals"])), (2, 1));
+    assert_eq!(json["cases"].as_array().unwrap().len(), 6);
+    let page = fs::read_to_string(out.join("score.md")).unwrap();
+    assert!(page.contains("| | bank | other | all |") && page.contains("| other/case_001 |"), "{page}");
+    let text = String::from_utf8(score(&bank, &names).stdout).unwrap();
+    assert!(text.lines().next().unwrap().split_whitespace().eq(["bank", "other", "all"]), "{text}");
+
+    refused(&score(&bank, &[bank.to_str().unwrap()]), &["two banks are named bank"]);
 }

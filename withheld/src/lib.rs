@@ -7,21 +7,24 @@
 
 mod answer;
 mod case;
+mod curves;
 mod draw;
 mod judge;
 mod outside;
 mod plan;
 mod robot;
 mod score;
+mod statistics;
 mod truth;
 mod visibility;
 
 pub use answer::{Answer, Named};
 pub use case::{Case, CaseError, CaseSpec, make_case};
+pub use curves::{CalibrationBin, VisibilityBin};
 pub use draw::{Difficulty, Sort, UNKNOWN};
 pub use judge::{Judgement, ParameterError, judge};
 pub use outside::Outside;
 pub use plan::Plan;
 pub use robot::Robot;
-pub use score::{CalibrationBin, CaseScore, GroupTotals, SCORE_SCHEMA, Score, Totals};
+pub use score::{BankTotals, CaseScore, GroupTotals, SCORE_SCHEMA, Score, Totals};
 pub use truth::{DETECTABLE, Group, SealedEffect, Truth, is_unknown};

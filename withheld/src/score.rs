@@ -1,6 +1,8 @@
-//! A whole bank's judgements in figures.
+//! The judgements of whole banks in figures.
 
+use crate::curves::{CalibrationBin, VisibilityBin, calibration, visibility};
 use crate::judge::Judgement;
+use crate::statistics::{mean_rounded, median, rounded};
 use crate::truth::{Group, SealedEffect, Truth, is_unknown};
 use gapscope_effects::Kind;
 use serde::Serialize;
@@ -9,18 +11,19 @@ use std::collections::BTreeMap;
 /// The public name of the schema.
 pub const SCORE_SCHEMA: &str = "gapscope.withheld/1";
 
-/// Bins of confidence in the calibration curve.
-const BINS: usize = 10;
-
-/// How a diagnoser did on a bank.
+/// How a diagnoser did on one bank or several.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Score {
     /// Always [`SCORE_SCHEMA`].
     pub schema: String,
-    /// The figures.
+    /// The figures over all cases.
     pub totals: Totals,
+    /// The figures of each bank, in the order of the cases.
+    pub banks: Vec<BankTotals>,
     /// Confidence against truth, bin by bin; empty bins are left out.
     pub calibration: Vec<CalibrationBin>,
+    /// Sealed effects of the catalogue found, by their visibility; empty bins are left out.
+    pub visibility: Vec<VisibilityBin>,
     /// Case by case.
     pub cases: Vec<CaseScore>,
 }
@@ -28,6 +31,8 @@ pub struct Score {
 /// One case with what was sealed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CaseScore {
+    /// Name of the bank.
+    pub bank: String,
     /// Name of the folder.
     pub case: String,
     /// Name of the robot.
@@ -82,6 +87,15 @@ pub struct Totals {
     pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
 }
 
+/// Figures of one bank.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BankTotals {
+    /// Its name.
+    pub bank: String,
+    /// The figures over its cases.
+    pub totals: Totals,
+}
+
 /// Shares of one group.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct GroupTotals {
@@ -95,24 +109,18 @@ pub struct GroupTotals {
     pub top1: Option<f64>,
 }
 
-/// Effects reported with a confidence from `from` to the next bin's.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CalibrationBin {
-    /// Lower end of the bin.
-    pub from: f64,
-    /// Effects in it.
-    pub n: usize,
-    /// Their mean confidence.
-    pub confidence: f64,
-    /// Share of them that are there.
-    pub right: f64,
-}
-
 impl CaseScore {
-    /// A judged case.
-    pub fn new(case: &str, truth: &Truth, judgement: Judgement, seconds: f64, error: Option<String>) -> CaseScore {
+    /// A judged case; `place` is the bank's name and the folder's.
+    pub fn new(
+        place: [&str; 2],
+        truth: &Truth,
+        judgement: Judgement,
+        seconds: f64,
+        error: Option<String>,
+    ) -> CaseScore {
         CaseScore {
-            case: case.to_owned(),
+            bank: place[0].to_owned(),
+            case: place[1].to_owned(),
             robot: truth.robot.clone(),
             group: truth.group(),
             kinds: truth.kinds.clone(),
@@ -133,8 +141,13 @@ impl CaseScore {
 impl Score {
     /// Figures of these cases.
     pub fn new(cases: Vec<CaseScore>) -> Score {
-        let calibration = calibration(&counted(&cases).flat_map(|j| j.conf.clone()).collect::<Vec<_>>());
-        Score { schema: SCORE_SCHEMA.to_owned(), totals: totals(&cases, &calibration), calibration, cases }
+        let banks = cases
+            .chunk_by(|a, b| a.bank == b.bank)
+            .map(|cases| BankTotals { bank: cases[0].bank.clone(), totals: totals(cases, &calibration(cases)) })
+            .collect();
+        let (calibration, visibility) = (calibration(&cases), visibility(&cases));
+        let totals = totals(&cases, &calibration);
+        Score { schema: SCORE_SCHEMA.to_owned(), totals, banks, calibration, visibility, cases }
     }
 
     /// Labels and counts of sealed effect against the one named first; the catalogue's order, then none, unknown and what
@@ -173,22 +186,9 @@ fn of_group(cases: &[CaseScore], group: Group) -> impl Iterator<Item = &Judgemen
 }
 
 /// Judgements of all cases but the undetectable, group by group: sums depend on their order, and so the last digit.
-fn counted(cases: &[CaseScore]) -> impl Iterator<Item = &Judgement> {
+pub(crate) fn counted(cases: &[CaseScore]) -> impl Iterator<Item = &Judgement> {
     let groups = Group::ALL.into_iter().filter(|group| *group != Group::Undetectable);
     groups.flat_map(move |group| of_group(cases, group))
-}
-
-fn calibration(confidences: &[(f64, bool)]) -> Vec<CalibrationBin> {
-    let bin = |i: usize| {
-        let from = i as f64 * 0.1;
-        // The last bin holds certainty too.
-        let to = from + 0.1 + if i + 1 == BINS { 1e-9 } else { 0.0 };
-        let held: Vec<&(f64, bool)> = confidences.iter().filter(|(c, _)| from <= *c && *c < to).collect();
-        let of = |value: fn(&(f64, bool)) -> f64| mean(&held.iter().map(|c| value(c)).collect::<Vec<f64>>());
-        let (confidence, right) = of(|c| c.0).zip(of(|c| f64::from(u8::from(c.1))))?;
-        Some(CalibrationBin { from, n: held.len(), confidence, right })
-    };
-    (0..BINS).filter_map(bin).collect()
 }
 
 fn totals(cases: &[CaseScore], calibration: &[CalibrationBin]) -> Totals {
@@ -235,81 +235,5 @@ fn totals(cases: &[CaseScore], calibration: &[CalibrationBin]) -> Totals {
         unknown_flagged: unknown,
         confusion,
         groups,
-    }
-}
-
-fn mean_rounded(values: &[f64]) -> Option<f64> {
-    mean(values).map(|mean| rounded(mean, 4))
-}
-
-fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| pairwise_sum(values) / values.len() as f64)
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    let upper = values.get(middle)?;
-    Some(if values.len() % 2 == 1 { *upper } else { (values[middle - 1] + upper) / 2.0 })
-}
-
-/// The decimal nearest to a number; a tie goes to the even digit.
-fn rounded(value: f64, decimals: usize) -> f64 {
-    // Formatting rounds the exact binary value, which scaling by a power of ten first would change.
-    format!("{value:.decimals$}").parse().unwrap_or(value)
-}
-
-/// The sum in numpy's order: means such as 0.99375 lie on the edge of two roundings, and the last bit decides.
-fn pairwise_sum(values: &[f64]) -> f64 {
-    const LANES: usize = 8;
-    const BLOCK: usize = 128;
-    let n = values.len();
-    if n < LANES {
-        return values.iter().sum();
-    }
-    if n > BLOCK {
-        let half = n / 2 - n / 2 % LANES;
-        return pairwise_sum(&values[..half]) + pairwise_sum(&values[half..]);
-    }
-    let mut lanes = [0.0; LANES];
-    let blocks = values.chunks_exact(LANES);
-    let rest = blocks.remainder();
-    for block in blocks {
-        for (lane, value) in lanes.iter_mut().zip(block) {
-            *lane += value;
-        }
-    }
-    let [a, b, c, d, e, f, g, h] = lanes;
-    rest.iter().fold(((a + b) + (c + d)) + ((e + f) + (g + h)), |sum, value| sum + value)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rounding_is_that_of_the_exact_value() {
-        assert_eq!(rounded(0.00625, 4), 0.0063); // the number nearest to 0.00625 lies above it
-        assert_eq!(rounded(0.03125, 4), 0.0312); // a tie
-        assert_eq!(rounded(2.675, 2), 2.67);
-    }
-
-    #[test]
-    fn sums_are_numpys() {
-        // What Python prints for numpy.sum([i * 0.1 + (1e-3 * i * i) % 0.7 for i in map(float, range(n))]).
-        let sums = [(5, 1.0300000000000002), (20, 21.47), (131, 892.3050000000002), (1000, 50270.90000000004)];
-        let values =
-            |n: usize| -> Vec<f64> { (0..n).map(|i| i as f64 * 0.1 + (1e-3 * i as f64 * i as f64) % 0.7).collect() };
-        for (n, sum) in sums {
-            assert_eq!(pairwise_sum(&values(n)), sum, "{n}");
-        }
-    }
-
-    #[test]
-    fn certainty_is_in_the_last_bin_and_nothing_is_lost() {
-        let bins = calibration(&[(1.0, true), (0.95, false), (0.3, true), (0.0, false)]);
-        let counts: Vec<(f64, usize)> = bins.iter().map(|b| (b.from, b.n)).collect();
-        assert_eq!(counts.len(), 3);
-        assert_eq!((counts[2].1, bins[2].right), (2, 0.5));
     }
 }

@@ -31,7 +31,7 @@ fn judgements_and_totals_are_those_of_the_reference() {
         let mut ours = serde_json::to_value(&judgement).unwrap();
         ours.as_object_mut().unwrap().remove("predicted_shrink");
         assert!(same(&ours, &case["judgement"]), "{}:\n{ours}\n{}", case["case"], case["judgement"]);
-        let score = CaseScore::new(case["case"].as_str().unwrap(), &truth, judgement, 0.0, None);
+        let score = CaseScore::new(["sample", case["case"].as_str().unwrap()], &truth, judgement, 0.0, None);
         assert_eq!(serde_json::to_value(score.group).unwrap(), case["group"], "{}", case["case"]);
         scores.push(score);
     }

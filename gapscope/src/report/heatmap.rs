@@ -2,8 +2,12 @@
 
 use super::format::{NONE, fixed, percent, percent_interval};
 use super::words;
+use crate::picture::{Cell, Matrix};
 use gapscope_diagnosis::schema::Regime;
 use maud::{Markup, html};
+
+/// Behind the quantity of a column whose bounds differ between joints.
+const BY_JOINT: &str = ", by joint";
 
 /// Columns under one regime's name.
 struct Group<'a> {
@@ -63,28 +67,60 @@ pub fn render(joints: &[String], regimes: &[Regime], caption: &str, whole: &str)
     }
 }
 
+/// The same as a picture of its own; `None` where there is nothing to show.
+pub fn picture(title: &str, joints: &[String], regimes: &[Regime]) -> Option<String> {
+    let joints: Vec<&String> = joints.iter().filter(|joint| regimes.iter().any(|r| r.joint == **joint)).collect();
+    let groups = groups(&joints, regimes);
+    let columns: Vec<(&str, &Column)> = groups.iter().flat_map(|g| g.columns.iter().map(|c| (g.name, c))).collect();
+    if columns.is_empty() {
+        return None;
+    }
+    // Bounds of each joint's own are for the table.
+    let bounds =
+        |heading: &str| if heading.ends_with(BY_JOINT) { String::new() } else { heading.replace('\u{2060}', "") };
+    let name = |(name, column): &(&str, &Column)| {
+        format!("{} {}", words::regime(name), bounds(&column.heading)).trim_end().to_owned()
+    };
+    let names: Vec<String> = columns.iter().map(name).collect();
+    let cell = |regime: &Regime| Cell {
+        shade: if regime.share.is_finite() { regime.share } else { 0.0 },
+        text: whole_percent(regime.share),
+        framed: words::stands_out(regime),
+        tip: tip(regime),
+    };
+    let cells: Vec<Vec<Option<Cell>>> = (0..joints.len())
+        .map(|row| columns.iter().map(|(_, c)| c.cells.get(row).copied().flatten().map(cell)).collect())
+        .collect();
+    let rows: Vec<String> = joints.into_iter().cloned().collect();
+    let note = "Framed: at least 1.5 times the regime’s part of the samples. Regimes overlap.";
+    Some(Matrix { title, sides: ["joint", "regime"], rows: &rows, columns: &names, cells: &cells, note }.svg())
+}
+
 fn cell(regime: Option<&Regime>, first: bool) -> Markup {
     let Some(regime) = regime else {
         return html! { td.empty.first[first] { (NONE) } };
     };
     let marked = words::stands_out(regime);
     let shade = if regime.share.is_finite() { regime.share.clamp(0.0, 1.0) } else { 0.0 };
-    let tip = format!(
-        "{}, {}: {} of the squared gap (95 %: {}), {} of the samples",
-        regime.joint,
-        words::regime_phrase(regime),
-        percent(regime.share),
-        percent_interval(regime.ci95),
-        percent(regime.samples),
-    );
     html! {
-        td.marked[marked] .first[first] style={ "--a:" (super::chart::short(shade)) } title=(tip) {
+        td.marked[marked] .first[first] style={ "--a:" (super::chart::short(shade)) } title=(tip(regime)) {
             (whole_percent(regime.share))
             @if marked && regime.samples > 0.0 {
                 small { (super::format::significant(regime.share / regime.samples, 2)) "×" }
             }
         }
     }
+}
+
+fn tip(regime: &Regime) -> String {
+    format!(
+        "{}, {}: {} of the squared gap (95 %: {}), {} of the samples",
+        regime.joint,
+        words::regime_phrase(regime),
+        percent(regime.share),
+        percent_interval(regime.ci95),
+        percent(regime.samples),
+    )
 }
 
 /// Percent without decimals, as the cells are small.
@@ -129,7 +165,7 @@ fn columns<'a>(name: &str, joints: &[&String], regimes: &'a [Regime]) -> Vec<Col
             let heading = match bounds.as_slice() {
                 [one] => words::interval(one).replace('–', "–\u{2060}").replace('\u{a0}', " "),
                 _ if count > 1 => format!("{} of {count}", i + 1),
-                [one, ..] => format!("{}, by joint", one.quantity.replace('_', " ")),
+                [one, ..] => one.quantity.replace('_', " ") + BY_JOINT,
                 [] => String::new(),
             };
             Column { heading, cells }

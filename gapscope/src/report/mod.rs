@@ -12,7 +12,7 @@ mod joints;
 mod power;
 mod rest;
 mod rollout;
-mod score;
+pub mod score;
 mod series;
 mod shrink;
 pub mod terminal;
@@ -26,18 +26,21 @@ mod tests;
 use gapscope_diagnosis::schema::{Diagnosis, Evidence, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+pub use answer::sentences as answer_sentences;
 pub use answer::{changed, headline, is_above_floor, largest};
 pub use axis::Axis;
 pub use format::{
-    NONE, count, estimate, figure, percent, percent_figure, percent_interval, plain, probability_figure, significant,
-    span, with_unit,
+    NONE, Printed, count, estimate, figure, percent, percent_figure, percent_interval, plain, probability_figure,
+    significant, span, with_unit,
 };
+pub use heatmap::picture as heatmap_picture;
 pub use power::line as power_line;
+pub use rest::sentence as sentence_of_the_rest;
 pub use rollout::page as rollout_page;
-pub use score::html as score;
+pub use series::picture as series_picture;
 pub use words::{
-    capital, effect, implied_unit, interval, joints as joint_list, learnable, motion_unit, outstanding, regime,
-    said_of, verdict,
+    capital, effect, implied_unit, interval, joints as joint_list, learnable, motion_unit, outstanding, parameter,
+    regime, regime_phrase, said_of, verdict,
 };
 
 /// Colours, type and layout; light and dark, wide, narrow and print.

@@ -9,29 +9,37 @@ use maud::{Markup, html};
 /// What is left after the effects, and where.
 pub fn unexplained(diagnosis: &Diagnosis) -> Markup {
     let left = &diagnosis.unexplained;
-    let outstanding = words::outstanding(&left.regimes);
     html! {
         @if matches!(diagnosis.verdict, Verdict::NoGap | Verdict::NotExcited) {
             p { (words::verdict_meaning(diagnosis.verdict)) }
         } @else {
-            p {
-                @if left.fraction > 0.0 {
-                    b { (percent(left.fraction)) } " of the squared torque gap is left above the noise floor"
-                    @if diagnosis.effects.is_empty() { ", since no effect was found" } @else { " after the effects" }
-                    @if let Some(first) = outstanding.first() {
-                        "; most clearly at " (first.joint) " " (words::regime_phrase(first)) ", with " (percent(first.share)) " of what is left there"
-                    }
-                    ". "
-                    (words::learnable(left))
-                } @else {
-                    "Nothing above the noise floor."
-                }
-            }
+            p { (sentence(diagnosis)) }
             @if left.fraction > 0.0 && !left.regimes.is_empty() {
                 (heatmap::render(&diagnosis.joints, &left.regimes, "What is left, by joint and regime", "what is left at the joint"))
             }
         }
     }
+}
+
+/// How much is left after the effects, and where most clearly, in words.
+pub fn sentence(diagnosis: &Diagnosis) -> String {
+    let left = &diagnosis.unexplained;
+    if matches!(diagnosis.verdict, Verdict::NoGap | Verdict::NotExcited) {
+        return words::verdict_meaning(diagnosis.verdict).into();
+    }
+    if left.fraction <= 0.0 {
+        return "Nothing above the noise floor.".into();
+    }
+    let when = if diagnosis.effects.is_empty() { ", since no effect was found" } else { " after the effects" };
+    let place = words::outstanding(&left.regimes).first().map_or(String::new(), |first| {
+        let (phrase, share) = (words::regime_phrase(first), percent(first.share));
+        format!("; most clearly at {} {phrase}, with {share} of what is left there", first.joint)
+    });
+    let fraction = percent(left.fraction);
+    format!(
+        "{fraction} of the squared torque gap is left above the noise floor{when}{place}. {}",
+        words::learnable(left)
+    )
 }
 
 /// Other sets of effects that the logs do not exclude.

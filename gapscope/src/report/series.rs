@@ -3,6 +3,7 @@
 use super::axis::Axis;
 use super::chart::{Plot, envelope, line};
 use super::format::{figure, with_unit};
+use crate::picture::{Panel, Series, panels};
 use gapscope_diagnosis::schema::{Diagnosis, Evidence, TorqueSeries};
 use maud::{Markup, html};
 
@@ -10,6 +11,46 @@ use maud::{Markup, html};
 const POINTS: usize = 90_000;
 /// Most stretches that one line is thinned to.
 const STRETCHES: usize = 750;
+
+/// Longest stretch in a picture of its own, s, and what its lines are thinned to.
+const WINDOW: f64 = 12.0;
+const THIN: usize = 240;
+
+/// Torque of every joint and beside it what the models leave, over the stretch in the middle of the logs, as a picture of
+/// its own; `None` where the evidence holds no torque.
+pub fn picture(title: &str, evidence: &Evidence) -> Option<String> {
+    let drawn: Vec<&TorqueSeries> = evidence.torque.iter().filter(|s| s.time.len() > 1).collect();
+    let panels_of: Vec<Panel> = drawn.iter().flat_map(|series| stretch(series)).collect();
+    (!panels_of.is_empty()).then(|| panels(title, &panels_of))
+}
+
+fn stretch(series: &TorqueSeries) -> [Panel; 2] {
+    let unit = if series.unit.is_empty() { "N m" } else { &series.unit };
+    let [first, last] = [series.time.first(), series.time.last()].map(|t| t.copied().unwrap_or(0.0));
+    let middle = 0.5 * (first + last);
+    let inside = |t: &f64| (t - middle).abs() <= 0.5 * WINDOW;
+    let kept: Vec<usize> = (0..series.time.len()).filter(|&i| inside(&series.time[i])).collect();
+    let of = |name: &str, value: &dyn Fn(usize) -> f64| {
+        let values: Vec<f64> = kept.iter().map(|&i| value(i)).collect();
+        let points = envelope(&values, &[], THIN).into_iter().map(|k| [series.time[kept[k]], values[k]]).collect();
+        Series { name: name.into(), points, ..Series::default() }
+    };
+    let nominal = |i: usize| series.nominal.get(i).copied().unwrap_or(f64::NAN);
+    let (effects, described) = ("model with the effects", "model as described");
+    let mut torque = vec![of(described, &|i| nominal(i)), of("measured", &|i| series.measured[i])];
+    let mut error = vec![of(described, &|i| series.measured[i] - nominal(i))];
+    // Where no effect was found, there is no other model.
+    if series.corrected.len() == series.time.len() {
+        torque.insert(0, of(effects, &|i| series.corrected[i]));
+        error.insert(0, of(effects, &|i| series.measured[i] - series.corrected[i]));
+    }
+    let x = Axis::tight(kept.iter().map(|&i| series.time[i]), "time, s", 6);
+    [("torque", torque), ("measured − model", error)].map(|(what, lines)| {
+        let values = lines.iter().flat_map(|line| &line.points).map(|p| p[1]);
+        let y = Axis::padded(values, &format!("{what}, {unit}"), 4);
+        Panel { title: series.joint.clone(), x: x.clone(), y, series: lines, rules: vec![] }
+    })
+}
 
 /// All joints, or a sentence where the evidence holds none.
 pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {

@@ -171,7 +171,7 @@ fn very_long_logs_stay_small() {
 
 #[test]
 fn the_page_of_a_score_is_well_formed_and_finite() {
-    use gapscope_withheld::{Answer, CaseScore, Score, Truth, judge};
+    use gapscope_withheld::{Answer, CaseScore, Group, Score, Truth, judge};
     let golden: serde_json::Value =
         serde_json::from_str(include_str!("../../../withheld/golden/judgements.json")).unwrap();
     let cases = golden["cases"].as_array().unwrap().iter().map(|case| {
@@ -179,13 +179,25 @@ fn the_page_of_a_score_is_well_formed_and_finite() {
         let answer: Option<Answer> = serde_json::from_value(case["diagnosis"].clone()).unwrap();
         let judgement = judge(&truth, answer.as_ref(), Some(&case["evaluation"]));
         let error = answer.is_none().then(|| "no <answer>".to_owned());
-        CaseScore::new(case["case"].as_str().unwrap(), &truth, judgement, 0.5, error)
+        CaseScore::new(["sample", case["case"].as_str().unwrap()], &truth, judgement, 0.5, error)
     });
     for score in [Score::new(cases.collect()), Score::new(vec![])] {
         let page = score::html(&score);
         check_balance("score", &page);
-        for word in ["NaN", "inf<", " inf ", "None<", "Some(", "<script", "https://"] {
-            assert!(!page.contains(word), "{word}");
+        let markdown = score::markdown::page(&score, "call", ["a.svg", "b.svg", "c.svg"]);
+        use score::pictures::{calibration, confusion, size};
+        for text in [&page, &markdown, &confusion(&score), &calibration(&score), &size(&score)] {
+            for word in ["NaN", "inf<", " inf ", "None<", "Some(", "<script", "https://", "<answer>"] {
+                assert!(!text.contains(word) || word == "<answer>" && text == &markdown, "{word}");
+            }
         }
+        let rows = markdown.lines().filter(|line| line.starts_with("| sample/")).count();
+        let missed = score.cases.iter().filter(|c| !c.judgement.exact && c.group != Group::Undetectable).count();
+        assert_eq!(rows, missed);
+        let (_, counts) = score.confusion_matrix();
+        let marked: usize = counts.iter().flatten().filter(|n| **n > 0).count();
+        assert!(confusion(&score).matches("named").count() > marked, "every count has its tip");
+        assert_eq!(calibration(&score).matches("<circle").count(), score.calibration.len());
+        assert_eq!(size(&score).matches("<circle").count(), score.visibility.len());
     }
 }

@@ -150,7 +150,7 @@ fn exponent(points: &[[f64; 2]]) -> f64 {
 
 /// A series of measured points.
 fn measured(name: impl Into<String>, points: Vec<[f64; 2]>) -> Series {
-    Series { name: name.into(), points, dashed: false, dots: true }
+    Series { name: name.into(), points, dots: true, ..Series::default() }
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 /// What a diagnoser may see of a case, and what is sealed.
 #[derive(Debug)]
 pub struct Case {
+    /// Name of the bank.
+    pub bank: String,
     /// Name of both folders.
     pub name: String,
     /// Robot and logs.
@@ -33,6 +35,7 @@ pub fn sealed_beside(bank: &Path) -> Result<PathBuf> {
 pub fn cases(bank: &Path) -> Result<Vec<Case>> {
     let bank = std::fs::canonicalize(bank).with_context(|| format!("cannot find the bank {}", bank.display()))?;
     let sealed = sealed_beside(&bank)?;
+    let bank_name = bank.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let names: Vec<String> = names(&bank)?.into_iter().filter(|name| name.starts_with("case_")).collect();
     if names.is_empty() {
         bail!("{} holds no case; expected folders case_000, case_001, …", bank.display());
@@ -41,7 +44,7 @@ pub fn cases(bank: &Path) -> Result<Vec<Case>> {
         bail!("the sealed folder {} is missing: without it there is no truth to score against", sealed.display());
     }
     let case = |name: String| {
-        let case = Case { open: bank.join(&name), sealed: sealed.join(&name), name };
+        let case = Case { bank: bank_name.clone(), open: bank.join(&name), sealed: sealed.join(&name), name };
         for file in [case.open.join("robot.urdf"), case.sealed.join("truth.json")] {
             if !file.is_file() {
                 bail!("{} is missing; make the bank again, or take the case out of it", file.display());

@@ -1,4 +1,4 @@
-//! `gapscope withheld score`: a binary diagnoses the cases of a bank; then the truth is opened.
+//! `gapscope withheld score`: a binary diagnoses the cases of banks; then the truth is opened.
 
 use super::bank::{Case, cases};
 use super::{progress, table};
@@ -8,22 +8,23 @@ use anyhow::{Context, Result, bail};
 use gapscope_withheld::{Answer, CaseScore, Score, judge};
 use rayon::prelude::*;
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 /// Names of the files that a score writes.
-const RESULTS: [&str; 2] = ["score.json", "score.html"];
+const RESULTS: [&str; 6] = ["score.json", "score.html", "score.md", "confusion.svg", "calibration.svg", "size.svg"];
 /// How often a running diagnosis is looked at, which is also the grain of its time.
 const GLANCE: Duration = Duration::from_millis(2);
 /// How much of an error message is kept, characters.
 const MESSAGE: usize = 300;
 
-/// Scores a bank; returns what to print.
+/// Scores banks; returns what to print.
 ///
 /// # Errors
-/// A bank that is not one, a binary that does not start, or results that exist or cannot be written.
+/// A bank that is not one, two of one name, a binary that does not start, or results that exist or cannot be written.
 pub fn run(args: &ScoreBank) -> Result<String> {
     if let Some(out) = &args.out {
         let there = RESULTS.iter().map(|name| out.join(name)).find(|file| file.exists());
@@ -39,7 +40,16 @@ pub fn run(args: &ScoreBank) -> Result<String> {
         Some(exe) => std::fs::canonicalize(exe).with_context(|| format!("cannot find {}", exe.display()))?,
         None => std::env::current_exe().context("cannot tell where this binary lies; name one with --exe")?,
     };
-    let cases = cases(&args.bank)?;
+    let mut names = BTreeSet::new();
+    let mut found = Vec::new();
+    for bank in &args.banks {
+        let of_bank = cases(bank)?;
+        if let Some(case) = of_bank.first().filter(|case| !names.insert(case.bank.clone())) {
+            bail!("two banks are named {}: give each once, and rename one if they differ", case.bank);
+        }
+        found.extend(of_bank);
+    }
+    let cases = found;
     let bar = progress(cases.len());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0)).build()?;
     let trial = |case: &Case| {
@@ -53,15 +63,23 @@ pub fn run(args: &ScoreBank) -> Result<String> {
     let judged = cases.iter().zip(trials).map(|(case, trial)| {
         let truth = case.truth()?;
         let judgement = judge(&truth, trial.answer.as_ref(), trial.evaluation.as_ref());
-        Ok(CaseScore::new(&case.name, &truth, judgement, trial.seconds, trial.error))
+        Ok(CaseScore::new([&case.bank, &case.name], &truth, judgement, trial.seconds, trial.error))
     });
     let score = Score::new(judged.collect::<Result<_>>()?);
     let json = serde_json::to_string_pretty(&score)?;
     let mut text = table::score(&score);
     if let Some(out) = &args.out {
-        output::write(&out.join(RESULTS[0]), &json)?;
-        output::write(&out.join(RESULTS[1]), &report::score(&score))?;
-        text.push_str(&format!("\nPicture and figures: {}, {}\n", out.join(RESULTS[1]).display(), RESULTS[0]));
+        let banks: Vec<&str> = score.banks.iter().map(|bank| bank.bank.as_str()).collect();
+        let call = format!("gapscope withheld score {} --out DIR", banks.join(" "));
+        let page = report::score::markdown::page(&score, &call, [RESULTS[3], RESULTS[4], RESULTS[5]]);
+        use report::score::pictures::{calibration, confusion, size};
+        let files =
+            [json.clone(), report::score::html(&score), page, confusion(&score), calibration(&score), size(&score)];
+        for (name, text) in RESULTS.iter().zip(&files) {
+            output::write(&out.join(name), text)?;
+        }
+        let files = format!("{}, {}, {}", out.join(RESULTS[1]).display(), RESULTS[2], RESULTS[0]);
+        text.push_str(&format!("\nPictures and figures: {files}\n"));
     }
     Ok(if args.json { json } else { text })
 }

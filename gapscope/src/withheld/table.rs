@@ -1,45 +1,28 @@
 //! A score as text.
 
-use crate::report::terminal::{fill, pad};
-use crate::report::{figure, percent};
-use gapscope_withheld::{Group, Score};
+use crate::report::score::figures::table;
+use crate::report::terminal::{column, fill, pad};
+use gapscope_withheld::Score;
 use std::fmt::Write;
 
-/// Width of the names at the left.
+/// Width of the names at the left of the matrix.
 const NAMES: usize = 24;
+/// Most columns of the name of a bank.
+const BANK: usize = 16;
 
 /// The figures of a score and its confusion matrix.
 pub fn score(score: &Score) -> String {
-    let t = &score.totals;
-    let part = |p: Option<f64>| p.map_or("–".into(), percent);
-    let number = |x: Option<f64>| x.map_or("–".into(), figure);
-    let mut text = format!("{}{:>6}{:>8}{:>11}{:>13}\n", pad("cases", NAMES), "n", "exact", "with ties", "first named");
-    for (group, shares) in Group::ALL.iter().filter_map(|g| Some((g, t.groups.get(g.name())?))) {
-        let cells = [(shares.exact, 8), (shares.class_exact, 11), (shares.top1, 13)];
-        let cells: String = cells.into_iter().map(|(share, width)| fill(&part(share), width)).collect();
-        let _ = writeln!(text, "{}{:>6}{cells}", pad(group.name(), NAMES), shares.n);
-    }
-    let conf = format!("expected error {} over {} effects named", number(t.calibration_error), t.reported_effects);
-    for (name, value) in [
-        ("set of effects (multi)", format!("F1 {}", number(t.set_f1_multi))),
-        ("joints", format!("F1 {}", number(t.joint_f1))),
-        (
-            "parameters",
-            format!(
-                "median error {}, gains {}; {} reported; {} of 95 % intervals hold the truth",
-                part(t.param_rel_err_median),
-                number(t.gain_abs_err_median),
-                part(t.param_reported),
-                part(t.interval_coverage)
-            ),
-        ),
-        ("confidence", conf),
-        ("no gap", format!("{} false alarms", part(t.no_gap_false_alarms))),
-        ("unknown effects", format!("{} flagged", part(t.unknown_flagged))),
-        ("shrink", format!("predicted {} off the sealed episodes’, mean", number(t.shrink_abs_err_mean))),
-        ("diagnosis", format!("{} s, median", number(t.seconds_median))),
-    ] {
-        let _ = writeln!(text, "{}{value}", pad(name, NAMES + 2));
+    let table = table(score);
+    let names = column(table.rows.iter().map(|row| row.0), 60) + 2;
+    let width = column(table.rows.iter().flat_map(|row| &row.1).chain(&table.columns).map(String::as_str), BANK) + 3;
+    // Writing to a string cannot fail.
+    let line = |name: &str, cells: &[String]| -> String {
+        let cells: String = cells.iter().map(|cell| fill(pad(cell, BANK).trim_end(), width)).collect();
+        format!("{}{cells}\n", pad(name, names))
+    };
+    let mut text = line("", &table.columns);
+    for (name, cells) in &table.rows {
+        text.push_str(&line(name, cells));
     }
     let (labels, counts) = score.confusion_matrix();
     if !labels.is_empty() {
@@ -52,9 +35,9 @@ pub fn score(score: &Score) -> String {
             let _ = writeln!(text, "{:>2} {}{row}", i + 1, pad(label, NAMES));
         }
     }
-    let failed: Vec<_> = score.cases.iter().filter_map(|c| Some((&c.case, c.error.as_ref()?))).collect();
+    let failed: Vec<_> = score.cases.iter().filter_map(|c| Some((c, c.error.as_ref()?))).collect();
     for (case, error) in &failed {
-        let _ = writeln!(text, "{case}: no diagnosis: {}", error.replace('\n', " "));
+        let _ = writeln!(text, "{}/{}: no diagnosis: {}", case.bank, case.case, error.replace('\n', " "));
     }
     text.replace(['\u{a0}', '\u{202f}'], " ")
 }

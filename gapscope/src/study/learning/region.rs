@@ -44,7 +44,8 @@ pub fn run(budget: &Budget) -> Result<Findings> {
     let mut series = vec![line("residual", &residual), line("pure", &pure), line("physics alone", &physics)];
     let (least, most) = extent(series.iter().flat_map(|s| &s.points).map(|p| p[1]));
     let edge = vec![[1.0, least], [1.0, most]];
-    series.push(Series { name: "edge of the training region".into(), points: edge, dashed: true, dots: false });
+    let name = "edge of the training region".into();
+    series.push(Series { name, points: edge, dashed: true, ..Series::default() });
     let (inside, outside) = (2, SCALES.len() - 1);
     let findings = vec![
         format!(

@@ -72,7 +72,8 @@ pub fn run(budget: &Budget) -> Result<Findings> {
     }
     let from = errors[2 * (SIZES.len() - 1) * SAMPLES.len()];
     let law = SAMPLES.iter().map(|&n| [n as f64, from * (SAMPLES[0] as f64 / n as f64).sqrt()]).collect();
-    series.push(Series { name: "√(d/N), to compare".into(), points: law, dashed: true, dots: false });
+    let name = "√(d/N), to compare".into();
+    series.push(Series { name, points: law, dashed: true, ..Series::default() });
     findings.push(format!(
         "A bound of the form √(d/N), d = {INPUTS} inputs, would fall as N^−0.5; the exponents measured are in the last column. \
          There is no noise here: what is left is approximation, optimisation and too few rows."

@@ -1,0 +1,189 @@
+//! One page of documentation for one log.
+
+use super::published::Log;
+use crate::report::{
+    NONE, Printed, answer_sentences, capital, effect, estimate, figure, implied_unit, joint_list, motion_unit,
+    outstanding, parameter, percent, percent_interval, plain, probability_figure, regime_phrase, sentence_of_the_rest,
+    with_unit,
+};
+use gapscope_diagnosis::Outcome;
+use gapscope_diagnosis::schema::{Change, Diagnosis, Estimate, FoundEffect, Parameter, Quantity};
+use std::fmt::Write;
+
+/// Regimes listed of what is left.
+const LISTED: usize = 6;
+
+/// Another log of the robot with the change of its torque gap by the corrected model.
+pub struct Other {
+    pub log: &'static str,
+    pub change: Change,
+}
+
+/// The page; `pictures` are the files of torque over time and of what is left, where there is one.
+pub fn markdown(log: &Log, outcome: &Outcome, others: &[Other], pictures: [Option<&str>; 2]) -> String {
+    let diagnosis = &outcome.diagnosis;
+    let [place, which, how_far] = answer_sentences(diagnosis, &outcome.evidence);
+    let mut text = format!(
+        "# {}\n\n{}\n\n```\ngapscope diagnose {set}/robot.urdf {set}/{}\n```\n\n- **Verdict.** {}\n- **Where.** {place}\n- **Which.** {which}\n- **How far.** {how_far}\n\n",
+        log.title,
+        log.about,
+        log.log,
+        capital(crate::report::verdict(diagnosis.verdict)),
+        set = log.set,
+    );
+    // Writing to a string cannot fail.
+    let _ =
+        writeln!(text, "## What was found, beside what was published\n\n{}\n\n{}", log.source, found(log, diagnosis));
+    if let Some(picture) = pictures[0] {
+        let _ = writeln!(
+            text,
+            "## Torque over time\n\nBelow {} Hz; every stretch is modelled by a fit that has not seen it.\n\n![Torque, and what the models leave of it]({picture})\n",
+            plain(diagnosis.data.band)
+        );
+    }
+    let _ = writeln!(text, "## How far the gap shrinks\n\n{}", shrink(diagnosis));
+    if !others.is_empty() {
+        text.push_str("The corrected model on other logs of the same robot, of which the diagnosis has seen nothing:\n\n| log | torque gap before | after | shrinks by | 95 % |\n|---|--:|--:|--:|--:|\n");
+        for other in others {
+            text.push_str(&change_row(other.log, &other.change));
+        }
+        text.push('\n');
+    }
+    let _ = writeln!(text, "## What stays unexplained\n\n{}\n", sentence_of_the_rest(diagnosis));
+    let marked = outstanding(&diagnosis.unexplained.regimes);
+    if !marked.is_empty() {
+        text.push_str("| joint | where | part of what is left there | part of the samples |\n|---|---|--:|--:|\n");
+        for regime in marked.iter().take(LISTED) {
+            let (share, samples) = (percent(regime.share), percent(regime.samples));
+            let _ = writeln!(text, "| {} | {} | {share} | {samples} |", regime.joint, regime_phrase(regime));
+        }
+        text.push('\n');
+    }
+    if let Some(picture) = pictures[1] {
+        let _ = writeln!(text, "![What is left, by joint and regime]({picture})\n");
+    }
+    text.push_str("This page and its pictures are made by `gapscope study real-logs --data DIR --force`.\n");
+    text.replace('\u{202f}', "\u{a0}")
+}
+
+/// Every parameter found, and those published that were not.
+fn found(log: &Log, diagnosis: &Diagnosis) -> String {
+    let mut text = String::from(
+        "| effect | joint | parameter | found | 95 % interval | published | off by |\n|---|---|---|--:|---|--:|--:|\n",
+    );
+    for one in &diagnosis.effects {
+        for (name, value) in &one.parameters {
+            let estimates: Vec<(&str, &Estimate)> = match value {
+                Parameter::Single(estimate) => vec![("", estimate)],
+                // In the order of the robot's joints.
+                Parameter::PerJoint(map) => {
+                    diagnosis.joints.iter().filter_map(|joint| Some((joint.as_str(), map.get(joint)?))).collect()
+                }
+            };
+            for (joint, value) in estimates {
+                let published = published(log, &one.kind, name, joint);
+                let place =
+                    if joint.is_empty() { joint_list(&one.joints, &diagnosis.joints) } else { joint.to_owned() };
+                let Printed { value: printed, interval, unit, .. } = estimate(value);
+                let off = published.zip(scalar(value)).map(|(p, value)| percent((value / p - 1.0).abs()));
+                let cells = [
+                    effect(&one.kind),
+                    place,
+                    parameter(name),
+                    with_unit(&printed, &unit),
+                    interval.join(" "),
+                    published.map_or(NONE.into(), figure),
+                    off.unwrap_or(NONE.into()),
+                ];
+                let _ = writeln!(text, "| {} |", cells.join(" | "));
+            }
+        }
+    }
+    for missing in log.published {
+        for (joint, value) in
+            missing.values.iter().filter(|(joint, _)| !is_found(diagnosis, missing.kind, missing.parameter, joint))
+        {
+            let _ = writeln!(
+                text,
+                "| {} | {joint} | {} | not found | | {} | |",
+                effect(missing.kind),
+                parameter(missing.parameter),
+                figure(*value)
+            );
+        }
+    }
+    text.push('\n');
+    for one in &diagnosis.effects {
+        text.push_str(&confidence(one));
+    }
+    text
+}
+
+fn confidence(one: &FoundEffect) -> String {
+    let ties: Vec<String> = one.indistinguishable_from.iter().map(|kind| effect(kind)).collect();
+    let ties =
+        if ties.is_empty() { String::new() } else { format!("; these logs cannot tell it from {}", ties.join(", ")) };
+    let alone = one
+        .shrink
+        .torque
+        .map_or(String::new(), |part| format!(", alone it shrinks the torque gap by {}", percent(part)));
+    format!("- {}: confidence {} %{alone}{ties}.\n", capital(&effect(&one.kind)), probability_figure(one.confidence))
+}
+
+fn published(log: &Log, kind: &str, parameter: &str, joint: &str) -> Option<f64> {
+    let known = log.published.iter().find(|p| p.kind == kind && p.parameter == parameter)?;
+    known.values.iter().find(|(of, _)| *of == joint).map(|(_, value)| *value)
+}
+
+fn is_found(diagnosis: &Diagnosis, kind: &str, parameter: &str, joint: &str) -> bool {
+    let parameters = diagnosis.effects.iter().filter(|e| e.kind == kind).filter_map(|e| e.parameters.get(parameter));
+    parameters.into_iter().any(|p| match p {
+        Parameter::Single(_) => joint.is_empty(),
+        Parameter::PerJoint(map) => map.contains_key(joint),
+    })
+}
+
+fn scalar(estimate: &Estimate) -> Option<f64> {
+    match estimate.value {
+        Quantity::Scalar(value) => Some(value),
+        Quantity::Vector(_) => None,
+    }
+}
+
+fn shrink(diagnosis: &Diagnosis) -> String {
+    let (shrink, regimes) = (&diagnosis.shrink, &diagnosis.gap.regimes);
+    let (position, velocity) = (motion_unit(regimes, false), motion_unit(regimes, true));
+    let mut text = String::from(
+        "Held-out data, rms over the joints.\n\n| gap in | before | after | shrinks by | 95 % |\n|---|--:|--:|--:|--:|\n",
+    );
+    text.push_str(&change_row("torque, of effort std", &shrink.torque));
+    text.push_str(&change_row(&format!("one step, {velocity}"), &shrink.one_step));
+    for h in &shrink.rollout {
+        text.push_str(&change_row(&format!("rollout of {} s, {position}", plain(h.horizon)), &h.change));
+    }
+    let of = |value: Option<f64>| value.map_or(NONE.into(), figure);
+    let reference = &shrink.reference;
+    let _ = writeln!(
+        text,
+        "\nIn the measure of the first row the noise floor is {}; a residual network on top of the nominal model leaves {}, a network alone {}.\n",
+        figure(reference.noise_floor),
+        of(reference.residual_network),
+        of(reference.pure_network)
+    );
+    text.push_str("| joint | torque gap, rms | 95 % | noise floor |\n|---|--:|--:|--:|\n");
+    let torque = &diagnosis.gap.torque;
+    for joint in &diagnosis.joints {
+        let Some(rms) = torque.rms.get(joint) else { continue };
+        let ends =
+            torque.ci95.get(joint).map_or(NONE.into(), |[from, to]| format!("{}–{}", figure(*from), figure(*to)));
+        let floor = of(torque.floor.get(joint).copied());
+        let _ = writeln!(text, "| {joint} | {} {} | {ends} | {floor} |", figure(*rms), implied_unit(joint, regimes));
+    }
+    text
+}
+
+fn change_row(name: &str, change: &Change) -> String {
+    let [before, after] = change.gaps().map(figure);
+    let shrink = change.shrink.map_or("at the floor".into(), percent);
+    format!("| {name} | {before} | {after} | {shrink} | {} |\n", change.ci95.map_or(NONE.into(), percent_interval))
+}

@@ -1,6 +1,7 @@
 //! Derivatives, batches of rollouts, and planning by sampling, on a 7-joint arm; batches and planner on all cores.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use gapscope_dynamics::{Data, Discrete, Integrator, Model, robots};
 use gapscope_network::{Activation, Init, Mlp, Net};
@@ -9,6 +10,7 @@ use gapscope_rollout::Batch;
 use gapscope_rollout::control::{Controller, Mppi, MppiSettings, Task};
 use nalgebra::DMatrix;
 use std::hint::black_box;
+use std::time::Duration;
 
 const DT: f64 = 0.01;
 
@@ -68,8 +70,57 @@ fn batches(c: &mut Criterion) {
     group.finish();
 }
 
+/// Time that the processor spent on this program's threads: what a command costs whatever else the machine does.
+struct ProcessorTime;
+
+impl ProcessorTime {
+    /// `None` where the system does not say (Linux does).
+    fn now() -> Option<Duration> {
+        let threads = std::fs::read_dir("/proc/self/task").ok()?;
+        let times = threads.map(|thread| {
+            let times = std::fs::read_to_string(thread.ok()?.path().join("schedstat")).ok()?;
+            times.split(' ').next()?.parse::<u64>().ok()
+        });
+        times.sum::<Option<u64>>().map(Duration::from_nanos)
+    }
+}
+
+impl Measurement for ProcessorTime {
+    type Intermediate = Duration;
+    type Value = Duration;
+    fn start(&self) -> Duration {
+        Self::now().unwrap()
+    }
+    fn end(&self, start: Duration) -> Duration {
+        Self::now().unwrap() - start
+    }
+    fn add(&self, a: &Duration, b: &Duration) -> Duration {
+        *a + *b
+    }
+    fn zero(&self) -> Duration {
+        Duration::ZERO
+    }
+    fn to_f64(&self, time: &Duration) -> f64 {
+        WallTime.to_f64(time)
+    }
+    fn formatter(&self) -> &dyn ValueFormatter {
+        const WALL: &WallTime = &WallTime;
+        WALL.formatter()
+    }
+}
+
+fn processor(c: &mut Criterion<ProcessorTime>) {
+    if ProcessorTime::now().is_some() {
+        planner(c, "mppi_1024x30_processor");
+    }
+}
+
+fn wall(c: &mut Criterion) {
+    planner(c, "mppi_1024x30");
+}
+
 /// One command: 1024 samples of 30 steps.
-fn planner(c: &mut Criterion) {
+fn planner<M: Measurement>(c: &mut Criterion<M>, name: &str) {
     let from = [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.6];
     let to = [1.0, 0.3, -0.5, -1.4, 0.6, 2.2, -0.4];
     let task = Task::reach(&arm(), &from, &to, [1.0, 0.4], DT);
@@ -81,7 +132,7 @@ fn planner(c: &mut Criterion) {
         temperature: 0.05,
         seed: 1,
     };
-    let mut group = c.benchmark_group("mppi_1024x30");
+    let mut group = c.benchmark_group(name);
     group.sample_size(20);
     let mut tau = vec![0.0; 7];
     let x = task.reference_at(0).to_vec();
@@ -92,5 +143,6 @@ fn planner(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, derivatives, batches, planner);
-criterion_main!(benches);
+criterion_group!(benches, derivatives, batches, wall);
+criterion_group!(name = costs; config = Criterion::default().with_measurement(ProcessorTime); targets = processor);
+criterion_main!(benches, costs);

@@ -102,16 +102,18 @@ impl Discrete {
             let (rate, acceleration) = slope.split_at_mut(n);
             rate.copy_from_slice(v);
             self.model.forward_dynamics_lanes(&mut self.lanes, q, v, &self.torque, acceleration);
-            for i in 0..2 * n {
+            let sums = sum.iter_mut().zip(stage.iter_mut());
+            for ((sum, stage), (start, slope)) in sums.zip(start.iter().zip(slope.iter())) {
                 for k in 0..LANES {
-                    sum[i][k] += weight * slope[i][k];
-                    stage[i][k] = start[i][k] + reach * dt * slope[i][k];
+                    sum[k] += weight * slope[k];
+                    stage[k] = start[k] + reach * dt * slope[k];
                 }
             }
         }
         if self.integrator == Integrator::SemiImplicitEuler {
-            for i in 0..n {
-                (0..LANES).for_each(|k| sum[i][k] += dt * sum[n + i][k]);
+            let (positions, velocities) = sum.split_at_mut(n);
+            for (position, velocity) in positions.iter_mut().zip(velocities) {
+                (0..LANES).for_each(|k| position[k] += dt * velocity[k]);
             }
         }
         for (start, sum) in start.iter_mut().zip(sum) {
@@ -164,17 +166,17 @@ impl StepModel for Discrete {
         assert!(x.len() == 2 * tau.len() && tau.len().is_multiple_of(n.max(1)), "one row of torques a state");
         for (x, tau) in x.chunks_mut(LANES * 2 * n).zip(tau.chunks(LANES * n)) {
             let rows = tau.len() / n;
-            // Lanes without a state repeat the last one.
-            let row = |k: usize| k.min(rows - 1);
-            for i in 0..2 * n {
-                (0..LANES).for_each(|k| self.eight.start[i][k] = x[row(k) * 2 * n + i]);
-            }
-            for j in 0..n {
-                (0..LANES).for_each(|k| self.torque[j][k] = tau[row(k) * n + j]);
+            for k in 0..LANES {
+                // Lanes without a state repeat the last one.
+                let row = k.min(rows - 1);
+                let state = &x[row * 2 * n..(row + 1) * 2 * n];
+                self.eight.start.iter_mut().zip(state).for_each(|(lanes, x)| lanes[k] = *x);
+                let torque = &tau[row * n..(row + 1) * n];
+                self.torque.iter_mut().zip(torque).for_each(|(lanes, tau)| lanes[k] = *tau);
             }
             self.step_lanes();
-            for k in 0..rows {
-                (0..2 * n).for_each(|i| x[k * 2 * n + i] = self.eight.start[i][k]);
+            for (k, state) in x.chunks_exact_mut(2 * n).enumerate() {
+                state.iter_mut().zip(&self.eight.start).for_each(|(x, lanes)| *x = lanes[k]);
             }
         }
     }

@@ -22,6 +22,7 @@ mod activation;
 mod adam;
 mod error;
 mod gradient_check;
+mod layer;
 mod learner;
 mod loss;
 mod mlp;

@@ -1,8 +1,9 @@
 //! Forward and backward through the network, one row or many at a time.
 
 use crate::activation::Activation;
+use crate::layer;
 use crate::mlp::Mlp;
-use crate::product::{product, product_transposed, transposed_product};
+use crate::product::{product_transposed, transposed_product};
 use crate::real::Real;
 use crate::vector;
 
@@ -47,24 +48,11 @@ impl<T: Real> Mlp<T> {
     /// # Panics
     /// If `x` or `y` is not as long as the network has inputs or outputs.
     pub fn forward(&self, pass: &mut Pass<T>, x: &[T], y: &mut [T]) {
-        assert_eq!((x.len(), y.len()), (self.inputs(), self.outputs()), "lengths of x and y");
-        pass.fit(self, 1);
-        let last = self.layers().len() - 1;
-        for (l, layer) in self.layers().iter().enumerate() {
-            let (before, values) = pass.values.split_at_mut(l);
-            let input = before.last().map_or(x, Vec::as_slice);
-            let (weights, bias) = (&self.parameters()[layer.weights()], &self.parameters()[layer.bias()]);
-            if l == last {
-                vector::affine(weights, bias, input, y);
-            } else {
-                vector::affine(weights, bias, input, &mut values[0]);
-                vector::activate_all(&mut values[0], self.activation());
-            }
-        }
+        y.copy_from_slice(self.forward_batch(pass, x, 1));
     }
 
-    /// network(x) for each row of `x`, `[rows][inputs]`; the result, `[rows][outputs]`, is held by `pass`.
-    /// Does not allocate once `pass` has seen this network and number of rows.
+    /// network(x) for each row of `x`, `[rows][inputs]`; the result, `[rows][outputs]`, is held by `pass`. A row's result
+    /// is the same whatever the other rows. Does not allocate once `pass` has seen this network and number of rows.
     ///
     /// # Panics
     /// If `x` is not of length rows · inputs.
@@ -76,8 +64,8 @@ impl<T: Real> Mlp<T> {
             let (before, values) = pass.values.split_at_mut(l);
             let input = before.last().map_or(x, Vec::as_slice);
             let (weights, bias) = (&self.parameters()[layer.weights()], &self.parameters()[layer.bias()]);
-            product(&mut values[0], weights, input, [layer.outputs, layer.inputs, rows]);
-            vector::activate(&mut values[0], bias, if l == last { Activation::Identity } else { self.activation() });
+            let activation = if l == last { Activation::Identity } else { self.activation() };
+            layer::forward(weights, bias, input, &mut values[0], activation);
         }
         &pass.values[last]
     }

@@ -1,17 +1,8 @@
-//! Matrix products, by faer on one thread. Matrices are column by column.
+//! Matrix products of backpropagation, by faer on one thread. Matrices are column by column.
 
 use crate::real::Real;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
-
-/// c ← a b; a is m × k, b k × n, c m × n.
-pub(crate) fn product<T: Real>(c: &mut [T], a: &[T], b: &[T], [m, k, n]: [usize; 3]) {
-    let a = MatRef::from_column_major_slice(a, m, k);
-    let b = MatRef::from_column_major_slice(b, k, n);
-    let c = MatMut::from_column_major_slice_mut(c, m, n);
-    matmul(c, Accum::Replace, a, b, T::ONE, Par::Seq);
-    clean_registers();
-}
 
 /// c ← aᵀ b; a is k × m, b k × n, c m × n.
 pub(crate) fn transposed_product<T: Real>(c: &mut [T], a: &[T], b: &[T], [m, k, n]: [usize; 3]) {

@@ -54,16 +54,14 @@ pub struct Net<T> {
     network: Mlp<T>,
     pass: Pass<T>,
     x: Vec<T>,
-    y: Vec<T>,
 }
 
 impl<T: Real> Net<T> {
     /// The network with scratch.
     pub fn new(network: Mlp<T>) -> Self {
-        let mut pass = Pass::new();
-        let (x, mut y) = (vec![T::ZERO; network.inputs()], vec![T::ZERO; network.outputs()]);
-        network.forward(&mut pass, &x, &mut y);
-        Self { network, pass, x, y }
+        let (mut pass, x) = (Pass::new(), vec![T::ZERO; network.inputs()]);
+        network.forward_batch(&mut pass, &x, 1);
+        Self { network, pass, x }
     }
 
     /// The network.
@@ -80,26 +78,17 @@ impl<T: Real> Regressor for Net<T> {
         self.network.outputs()
     }
     fn predict(&mut self, x: &[f64], y: &mut [f64]) {
-        for (own, x) in self.x.iter_mut().zip(x) {
-            *own = T::from_f64(*x);
-        }
-        self.network.forward(&mut self.pass, &self.x, &mut self.y);
-        for (y, own) in y.iter_mut().zip(&self.y) {
-            *y = own.to_f64();
-        }
+        self.predict_batch(x, y);
     }
     /// All rows through each layer together. Allocates where there are more of them than ever before.
     fn predict_batch(&mut self, x: &[f64], y: &mut [f64]) {
-        let rows = x.len() / self.network.inputs();
-        self.x.resize(x.len().max(self.network.inputs()), T::ZERO);
-        for (own, x) in self.x.iter_mut().zip(x) {
-            *own = T::from_f64(*x);
+        if self.x.len() < x.len() {
+            self.x.resize(x.len(), T::ZERO);
         }
-        let out = self.network.forward_batch(&mut self.pass, &self.x[..x.len()], rows);
-        for (y, own) in y.iter_mut().zip(out) {
-            *y = own.to_f64();
-        }
-        self.x.truncate(self.network.inputs());
+        let own = &mut self.x[..x.len()];
+        own.iter_mut().zip(x).for_each(|(own, x)| *own = T::from_f64(*x));
+        let out = self.network.forward_batch(&mut self.pass, own, x.len() / self.network.inputs());
+        y.iter_mut().zip(out).for_each(|(y, out)| *y = out.to_f64());
     }
     /// Exact, by backpropagation of one row an output.
     fn jacobian(&mut self, x: &[f64], by_x: &mut [f64]) {

@@ -77,23 +77,19 @@ impl<M: StepModel + Send> Mppi<M> {
             block.cost = [0.0; BLOCK];
             state.chunks_exact_mut(len).for_each(|row| row.copy_from_slice(start));
             for (t, (plan, noise)) in plan.iter().zip(block.noise.chunks_exact_mut(BLOCK * n)).enumerate() {
-                let (free, reference) = (task.effort_at(step + t), task.reference_at(step + t + 1));
+                let free = task.effort_at(step + t);
                 let rows = tau.chunks_exact_mut(n).zip(noise.chunks_exact_mut(n));
                 for ((tau, noise), cost) in rows.zip(&mut block.cost) {
                     for j in 0..n {
                         tau[j] = (free[j] + plan[j] + noise[j]).clamp(-task.limit[j], task.limit[j]);
-                        let off = tau[j] - free[j];
                         // What the limit takes away is no part of the sample.
-                        noise[j] = off - plan[j];
-                        *cost += task.dt * task.weights[2] * off * off;
+                        noise[j] = tau[j] - free[j] - plan[j];
                     }
+                    *cost += task.effort_cost(step + t, tau);
                 }
                 model.step_batch(state, tau);
                 for (state, cost) in state.chunks_exact(len).zip(&mut block.cost) {
-                    for (i, reference) in reference.iter().enumerate() {
-                        let off = state[i] - reference;
-                        *cost += task.dt * task.weights[usize::from(i >= n)] * off * off;
-                    }
+                    *cost += task.state_cost(step + t + 1, state);
                 }
             }
         });
@@ -130,9 +126,12 @@ impl Block {
         let keep = settings.correlation;
         let fresh = (1.0 - keep * keep).sqrt();
         let row = BLOCK * n;
-        for i in 0..self.noise.len() {
-            let (before, fresh) = if i >= row { (keep * self.noise[i - row], fresh) } else { (0.0, 1.0) };
-            self.noise[i] = before + fresh * settings.deviation[i % n] * random.sample::<f64, _>(StandardNormal);
+        for first in (0..self.noise.len()).step_by(n) {
+            for (j, deviation) in settings.deviation.iter().enumerate() {
+                let i = first + j;
+                let (before, fresh) = if i >= row { (keep * self.noise[i - row], fresh) } else { (0.0, 1.0) };
+                self.noise[i] = before + fresh * deviation * random.sample::<f64, _>(StandardNormal);
+            }
         }
         if self.index == 0 {
             self.noise.chunks_exact_mut(row).for_each(|step| step[..n].fill(0.0));

@@ -14,6 +14,9 @@ const FLAT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Torque that shows play to be taken up, over what would wind the coupling by half the gap.
 const TAKEN_UP: f64 = 0.01;
 
+/// A coupling that is so soft, under a link that falls, that it runs away begins anew from here, rad (m).
+const LET_GO: f64 = 100.0;
+
 /// What joins motor and link: torque k δ + d δ̇ beyond half the play on either side, and never a pull.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Coupling {
@@ -119,6 +122,9 @@ impl WindUp {
                 if let Some((now, next)) = seen {
                     angle += pull * (coupling.held_by(now + (next - now) * part, angle) - angle);
                 }
+            }
+            if !(angle.abs() < LET_GO && rate.abs() < LET_GO / h) {
+                (angle, rate) = (0.0, 0.0);
             }
         }
         out
@@ -236,4 +242,18 @@ pub fn inertia_about(model: &Model, data: &mut Data, motion: &Motion, joint: usi
         here = there;
     }
     inertia
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_that_falls_faster_than_its_spring_holds_stays_finite() {
+        let coupling = Coupling { stiffness: 10.0, damping: 0.0, half_gap: 0.0 };
+        let (drive, inertia, slope) = (vec![1.0; 5000], vec![0.1; 5000], vec![-1000.0; 5000]);
+        let ahead = WindUp::forced(&drive, &inertia, Some(&slope), &coupling, 2e-3, None);
+        assert!(ahead.angle.iter().chain(&ahead.acceleration).all(|x| x.abs() < 1e7));
+        assert!(ahead.angle.iter().any(|x| x.abs() > 1.0));
+    }
 }

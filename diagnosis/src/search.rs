@@ -43,8 +43,10 @@ const STANDS_IN: [Kind; 11] = [
     Kind::ParallelSpring,
     Kind::GravityMisalignment,
 ];
-/// Part of the squared gap that no drive is looked for in.
-const NOTHING_LEFT: f64 = 1e-3;
+/// Part of the effort's variation below which no drive is looked for.
+const UNNOTICED: f64 = 2e-3;
+/// Part of the squared gap that must be left for a drive to be looked for near the noise floor.
+const ALL_BUT: f64 = 1e-3;
 /// What a kind more must take away, relative, where two sets with drives are compared.
 const A_KIND: f64 = 0.02;
 /// Accounts of drives that are tried beside the whole set.
@@ -111,7 +113,8 @@ impl Logs<'_> {
         }
         let stands_in = |chosen: &Chosen| chosen.exact.entries.iter().any(|e| STANDS_IN.contains(&e.candidate.kind));
         let rest = judged(best.0);
-        if rest.unexplained_fraction() > NOTHING_LEFT && (rest.leaves_any() || stands_in(&best.1)) {
+        let explained_otherwise = stands_in(&best.1) && rest.unexplained_fraction() > ALL_BUT;
+        if best.0 > UNNOTICED && (rest.leaves_any() || explained_otherwise) {
             let chosen = self.drives(best.1, progress)?;
             best = (left(&chosen)?, chosen);
         }

@@ -383,10 +383,9 @@ impl Logs<'_> {
             // The choice sees a drive by its rotor.
             let seen_as = if turned.is_some() { Kind::Armature } else { kind };
             let rival = rivals.iter().find(|r| r.without == seen_as);
-            let late = chosen.late_doubt.filter(|_| select::LATE.contains(&kind));
-            let doubt = late.or(turned.map(|t| t.doubt)).unwrap_or_else(|| rival.map_or(0.0, |r| r.probability));
-            let mut confused = rival
-                .filter(|_| turned.is_none() && late.is_none())
+            let doubt = turned.map_or_else(|| rival.map_or(0.0, |r| r.probability), |t| t.doubt);
+            let confused = rival
+                .filter(|_| turned.is_none())
                 .filter(|r| r.probability > INDISTINGUISHABLE)
                 .map_or_else(Vec::new, |r| {
                     select::kinds(&chosen.all, &r.choice.set)
@@ -395,9 +394,6 @@ impl Logs<'_> {
                         .map(|k| k.name().to_owned())
                         .collect()
                 });
-            if late.is_some_and(|doubt| doubt > INDISTINGUISHABLE) {
-                confused.extend(select::LATE.iter().filter(|other| **other != kind).map(|k| k.name().to_owned()));
-            }
             let loss = rival.map_or(0.0, |r| r.choice.blocks.iter().sum::<f64>());
             found.push((
                 loss,

@@ -1,14 +1,14 @@
 //! The search: which effects, at which parameters, from a first look at all of them to what the plant itself predicts.
 
 use crate::constancy;
-use crate::corrected::{plant_pushed, residual};
+use crate::corrected::residual;
 use crate::diagnose::{Logs, Progress};
 use crate::estimate::Fit;
-use crate::floor::{self, noise_floor};
+use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
 use crate::problem::{Problem, Term};
 use crate::screen;
-use crate::select::{self, Choice, LATE};
+use crate::select::{self, Choice};
 use crate::signals::Signals;
 use crate::verdict;
 use gapscope_dynamics::Model;
@@ -53,7 +53,6 @@ const A_KIND: f64 = 0.02;
 const ACCOUNTS: usize = 2;
 
 /// What the search came to.
-#[derive(Clone)]
 pub(crate) struct Chosen {
     /// Every candidate, around the parameters found.
     pub all: Problem,
@@ -67,8 +66,6 @@ pub(crate) struct Chosen {
     pub noise: Vec<f64>,
     /// Springs and play, each in the place of its rotor.
     pub turned: Vec<Turned>,
-    /// Probability that a delay is a lag, or a lag a delay, where one is there.
-    pub late_doubt: Option<f64>,
 }
 
 /// A drive that turns on its own.
@@ -118,8 +115,6 @@ impl Logs<'_> {
             let chosen = self.drives(best.1, progress)?;
             best = (left(&chosen)?, chosen);
         }
-        let chosen = self.delay_or_lag(best.1)?;
-        best = (left(&chosen)?, chosen);
         if best.1.fit.set.is_empty() || best.0 < before {
             if judged(best.0).leaves_most() {
                 return self.constant(best.1);
@@ -202,55 +197,6 @@ impl Logs<'_> {
         Ok(better.map_or(best, |(_, better)| better))
     }
 
-    /// Looks a second time whether a delay is a lag, or a lag a delay, at the exact law of either and by what it leaves beyond
-    /// noise: a lag smooths the noise of the effort too, and so may leave less than the truth.
-    fn delay_or_lag(&self, best: Chosen) -> Result<Chosen, EffectError> {
-        let late = |c: &usize| LATE.contains(&best.all.entries[*c].candidate.kind);
-        let Some(at) = best.choice.set.iter().position(late) else { return Ok(best) };
-        let candidate = &best.exact.entries[at].candidate;
-        let other = if candidate.kind == LATE[0] { LATE[1] } else { LATE[0] };
-        let far = |c: usize| (best.all.entries[c].candidate.shape - candidate.shape).abs();
-        let place = (0..best.all.entries.len())
-            .filter(|&c| best.all.entries[c].candidate.kind == other)
-            .min_by(|&a, &b| far(a).total_cmp(&far(b)));
-        let Some(place) = place else { return Ok(best) };
-        let mut set = best.choice.set.clone();
-        set[at] = place;
-        set.sort_unstable();
-        let (exact, fit) = self.data(&best.noise).refine(&with_drives(&best.all, &set, &best.turned))?;
-        let choice = select::evaluate(&best.all, set);
-        let next = Chosen { all: best.all.clone(), choice, exact, fit, ..best.clone() };
-        let gain: Vec<f64> = self.excess(&best)?.iter().zip(self.excess(&next)?).map(|(b, n)| b - n).collect();
-        let mean = gain.iter().sum::<f64>() / gain.len().max(1) as f64;
-        let spread = gain.iter().map(|g| (g - mean).powi(2)).sum::<f64>().sqrt();
-        let errors = mean * gain.len() as f64 / spread.max(f64::MIN_POSITIVE);
-        // Where the two looks differ, neither is to be trusted.
-        let doubt = if errors > 0.0 { 0.5 } else { 0.5 * erfc(-errors / std::f64::consts::SQRT_2) };
-        Ok(Chosen { late_doubt: Some(doubt), ..best })
-    }
-
-    /// What a set leaves of each block beyond the noise floor, weighted, held out.
-    fn excess(&self, chosen: &Chosen) -> Result<Vec<f64>, EffectError> {
-        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
-        let n = self.model.dof();
-        let effects = chosen.fit.effects(&chosen.exact, self.model);
-        let side = chosen.exact.side(&chosen.fit.set);
-        let residuals: Vec<Vec<Vec<f64>>> = self
-            .signals
-            .iter()
-            .map(|s| {
-                let mut plant = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
-                Ok(residual(&mut plant, self.model, s, &self.still, chosen.fit.alignment()))
-            })
-            .collect::<Result<_, EffectError>>()?;
-        let noise = noise_floor(&self.signals, &self.band, &residuals, n, floor::lag(&effects));
-        let rows = self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows;
-        let beyond = |block: &Vec<f64>| {
-            (0..n).map(|j| weights[j].powi(2) * (block[j] - block[n] * noise[j].powi(2))).sum::<f64>()
-        };
-        Ok(gap::squares(&self.band, &rows, |_| true).iter().map(beyond).collect())
-    }
-
     /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first.
     fn constant(&self, mut chosen: Chosen) -> Result<Chosen, EffectError> {
         while let Some(&(worst, _)) =
@@ -331,7 +277,7 @@ impl Logs<'_> {
                 .map(|(&c, e)| (c, e.candidate.clone()))
                 .collect();
             if round == ROUNDS || choice.set.is_empty() {
-                return Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt: None });
+                return Ok(Chosen { all, choice, exact, fit, noise, turned });
             }
             all.replace(self.model, &self.signals, &self.band, &self.still, &changes);
             let at: Vec<usize> = (0..exact.entries.len()).collect();
@@ -344,7 +290,7 @@ impl Logs<'_> {
             let same = again.set == choice.set;
             choice = again;
             if same {
-                return Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt: None });
+                return Ok(Chosen { all, choice, exact, fit, noise, turned });
             }
         }
     }

@@ -155,9 +155,7 @@ fn tiles<T: Real, const REGISTER: usize, const N: usize, const R: usize>(
         }
         for r in 0..R {
             let y = &mut y[r * width + from..][..N];
-            for i in 0..N {
-                y[i] = sum[r][i];
-            }
+            y[..N].copy_from_slice(&sum[r][..N]);
         }
         next = from + N;
     }

@@ -40,7 +40,7 @@ fn named(play: Option<f64>, motor_encoders: bool) {
     let kinds: Vec<&str> = diagnosis.effects.iter().map(|e| e.kind.as_str()).collect();
     assert_eq!(kinds, [drive.kind().name(), "armature"], "{told}");
     for (found, effect) in diagnosis.effects.iter().zip(&effects) {
-        assert_eq!(found.joints, [name.clone()], "{told}");
+        assert_eq!(found.joints, std::slice::from_ref(&name), "{told}");
         assert!(found.confidence > 0.9, "{told}");
         // The damping is taken for granted, not found.
         let parameter = &effect.law().parameters()[0];

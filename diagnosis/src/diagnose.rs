@@ -379,7 +379,7 @@ impl Logs<'_> {
             let sums = gap::total(&gap::squares(&self.band, &alone.rows, |_| true));
             let shrink =
                 torque.shrink.zip(torque.before).map(|(_, before)| 1.0 - gap::weighted_rms(&sums, weights) / before);
-            let turned = chosen.turned.iter().find(|t| t.drive.kind == kind);
+            let turned = chosen.turned.as_ref().filter(|t| t.drive.kind == kind);
             // The choice sees a drive by its rotor.
             let seen_as = if turned.is_some() { Kind::Armature } else { kind };
             let rival = rivals.iter().find(|r| r.without == seen_as);

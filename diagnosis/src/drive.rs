@@ -10,6 +10,7 @@ use crate::band::Row;
 use crate::corrected::{aligned, plant_pushed};
 use crate::diagnose::Logs;
 use crate::floor::noise_floor;
+use crate::gap;
 use crate::kernel::apply;
 use crate::signals::{Signals, derivative_kernel};
 use gapscope_effects::{Candidate, Effect, EffectError, EncoderSide, JointRun, Kind};
@@ -25,11 +26,11 @@ const RESONANCE: [f64; 4] = [2.2, 3.6, 6.0, 10.0];
 const GAP: [f64; 5] = [0.004, 0.009, 0.018, 0.035, 0.07];
 /// Steps of the search for the best knob and rotor, relative: the first, and where it ends.
 const STEPS: (f64, f64) = (0.2, 0.004);
+/// Moves of that search, at most.
+const MOVES: usize = 40;
 /// Gauss–Newton steps from each first try, and the farthest that one goes, relative.
 const DESCENTS: usize = 3;
 const FARTHEST: f64 = 0.5;
-/// Moves of that search, at most.
-const MOVES: usize = 40;
 /// A drive is not rigid where an account of it leaves less in so many more blocks of time that tell, over their root (the
 /// sign test: a burst of chatter is one block), ...
 const BEYOND_DOUBT: f64 = 1.5;
@@ -52,7 +53,7 @@ const SEED: u64 = 5;
 pub(crate) struct Account {
     /// Spring or play at the knob found.
     pub drive: Candidate,
-    /// By how many standard errors it is better.
+    /// By how many standard errors of the sign test it is better.
     pub beyond: f64,
 }
 
@@ -71,18 +72,14 @@ struct Study<'a> {
 }
 
 impl Logs<'_> {
-    /// The best account of each joint's drive that is better than a rigid one, beside other effects; best first.
-    pub(crate) fn accounts(
-        &self,
-        others: &[Effect],
-        side: EncoderSide,
-        alignment: f64,
-    ) -> Result<Vec<Account>, EffectError> {
+    /// The best account of each joint's drive that is better than a rigid one, beside other effects, none of them such a
+    /// drive; best first.
+    pub(crate) fn accounts(&self, others: &[Effect], alignment: f64) -> Result<Vec<Account>, EffectError> {
         let runs: Vec<Vec<JointRun>> = self
             .signals
             .par_iter()
             .map(|s| {
-                let mut plant = plant_pushed(self.model, others, side, s.dt, &s.pushed)?;
+                let mut plant = plant_pushed(self.model, others, EncoderSide::Link, s.dt, &s.pushed)?;
                 Ok(aligned(self.model, s, &self.still, alignment, |motion| plant.joint_runs(motion)))
             })
             .collect::<Result<_, EffectError>>()?;
@@ -119,7 +116,7 @@ impl<'a> Study<'a> {
                 noisier(s, run, s.position_noise[joint], white(s), seed)
             })
             .collect();
-        study.noise = study.mean_squares(&study.noise_in(&rest, &rigid, rotor));
+        study.noise = study.noise(&rigid, rotor, &study.rows(&rigid, rotor));
         let effort = mean(&logs.signals.iter().map(|s| mean_square(&s.tau[joint])).collect::<Vec<_>>());
         study.nothing = OF_NOISE * mean(&study.noise) + OF_EFFORT * OF_EFFORT * effort;
         study
@@ -217,8 +214,11 @@ impl<'a> Study<'a> {
 
     /// What a drive leaves at the rows of the band.
     fn rows(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
-        let band = &self.logs.band;
-        self.runs.iter().enumerate().flat_map(|(e, run)| band.filter(e, &run.left_by(drive, rotor))).collect()
+        self.rows_of(self.runs.iter().copied(), drive, rotor)
+    }
+
+    fn rows_of<'r>(&self, runs: impl Iterator<Item = &'r JointRun>, drive: &Candidate, rotor: f64) -> Vec<f64> {
+        runs.enumerate().flat_map(|(e, run)| self.logs.band.filter(e, &run.left_by(drive, rotor))).collect()
     }
 
     /// Knob and rotor where a drive leaves least: a search along the two in steps that become smaller.
@@ -256,9 +256,9 @@ impl<'a> Study<'a> {
 
     /// Mean square of each block that a drive leaves beyond noise and nothing, (N m)².
     fn left(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
-        let rest: Vec<Vec<f64>> = self.runs.iter().map(|run| run.left_by(drive, rotor)).collect();
-        let noise = self.mean_squares(&self.noise_in(&rest, drive, rotor));
-        self.mean_squares(&rest)
+        let rest = self.rows(drive, rotor);
+        let noise = self.noise(drive, rotor, &rest);
+        self.mean_squares(rest)
             .into_iter()
             .zip(noise)
             .zip(&self.noise)
@@ -267,40 +267,28 @@ impl<'a> Study<'a> {
             .collect()
     }
 
-    /// What more noise changes of a rest.
-    fn noise_in(&self, rest: &[Vec<f64>], drive: &Candidate, rotor: f64) -> Vec<Vec<f64>> {
-        let change = |(run, rest): (&JointRun, &Vec<f64>)| {
-            run.left_by(drive, rotor).iter().zip(rest).map(|(noisier, rest)| noisier - rest).collect()
-        };
-        self.noisier.iter().zip(rest).map(change).collect()
+    /// Mean square of what more noise changes of a rest, in each block, (N m)².
+    fn noise(&self, drive: &Candidate, rotor: f64, rest: &[f64]) -> Vec<f64> {
+        let noisier = self.rows_of(self.noisier.iter(), drive, rotor);
+        self.mean_squares(noisier.iter().zip(rest).map(|(noisier, rest)| noisier - rest).collect())
     }
 
     /// Of every block that has rows.
-    fn mean_squares(&self, rest: &[Vec<f64>]) -> Vec<f64> {
-        let band = &self.logs.band;
-        let mut sums = vec![(0.0, 0usize); band.blocks];
-        for (e, rest) in rest.iter().enumerate() {
-            for (i, x) in band.of_episode[e].clone().zip(band.filter(e, rest)) {
-                let (sum, count) = &mut sums[band.rows[i].block];
-                *sum += x * x;
-                *count += 1;
-            }
-        }
-        sums.into_iter().filter(|(_, count)| *count > 0).map(|(sum, count)| sum / count as f64).collect()
+    fn mean_squares(&self, rows: Vec<f64>) -> Vec<f64> {
+        gap::squares(&self.logs.band, &vec![rows], |_| true).iter().map(|block| block[0] / block[1]).collect()
     }
 
     /// Standard error of the knob, the rotor free: sandwich over blocks.
     fn error(&self, drive: &Candidate, rotor: f64) -> f64 {
-        let rows = |drive: &Candidate, rotor: f64| self.rows(drive, rotor);
-        let rest = rows(drive, rotor);
+        let rest = self.rows(drive, rotor);
         let slope = |step: f64, moved: Vec<f64>, back: Vec<f64>| -> Vec<f64> {
             moved.iter().zip(&back).map(|(m, b)| (m - b) / (2.0 * step)).collect()
         };
         let by = STEPS.1 * drive.shape;
-        let knob = |by: f64| rows(&Candidate { shape: drive.shape + by, ..drive.clone() }, rotor);
+        let knob = |by: f64| self.rows(&Candidate { shape: drive.shape + by, ..drive.clone() }, rotor);
         let knob = slope(by, knob(by), knob(-by));
         let by = STEPS.1 * rotor;
-        let rotor = slope(by, rows(drive, rotor + by), rows(drive, rotor - by));
+        let rotor = slope(by, self.rows(drive, rotor + by), self.rows(drive, rotor - by));
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         // The knob's slope less what the rotor could make up for.
         let part = dot(&knob, &rotor) / dot(&rotor, &rotor).max(f64::MIN_POSITIVE);

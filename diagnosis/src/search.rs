@@ -27,13 +27,9 @@ const ROUNDS: usize = 4;
 /// Kinds that with many coefficients, or with one for all that a joint carries, can promise more than they keep.
 const INERTIAL: [Kind; 4] = [Kind::Payload, Kind::LinkInertiaError, Kind::GravityMisalignment, Kind::TorqueGainError];
 
-/// Kinds of which a spring or play in the drive is one, or takes the rotor along.
-const DRIVE: [Kind; 3] = [Kind::Armature, Kind::JointElasticity, Kind::Backlash];
-/// Kinds that a first look may have taken for a drive that turns on its own.
-const STANDS_IN: [Kind; 11] = [
+/// Kinds that a first look may have taken for a drive that turns on its own; the rotor is part of it.
+const STANDS_IN: [Kind; 9] = [
     Kind::Armature,
-    Kind::JointElasticity,
-    Kind::Backlash,
     Kind::LinkInertiaError,
     Kind::Payload,
     Kind::TorqueGainError,
@@ -47,7 +43,7 @@ const STANDS_IN: [Kind; 11] = [
 const UNNOTICED: f64 = 2e-3;
 /// Part of the squared gap that must be left for a drive to be looked for near the noise floor.
 const ALL_BUT: f64 = 1e-3;
-/// What a kind more must take away, relative, where two sets with drives are compared.
+/// What a kind more must take away, relative, where two sets with a drive are compared.
 const A_KIND: f64 = 0.02;
 /// Accounts of drives that are tried beside the whole set.
 const ACCOUNTS: usize = 2;
@@ -64,8 +60,8 @@ pub(crate) struct Chosen {
     pub fit: Fit,
     /// Noise floor of each joint.
     pub noise: Vec<f64>,
-    /// Springs and play, each in the place of its rotor.
-    pub turned: Vec<Turned>,
+    /// Spring or play in the drive of a joint, in the place of its rotor.
+    pub turned: Option<Turned>,
 }
 
 /// A drive that turns on its own.
@@ -112,7 +108,7 @@ impl Logs<'_> {
         let rest = judged(best.0);
         let explained_otherwise = stands_in(&best.1) && rest.unexplained_fraction() > ALL_BUT;
         if best.0 > UNNOTICED && (rest.leaves_any() || explained_otherwise) {
-            let chosen = self.drives(best.1, progress)?;
+            let chosen = self.drive(best.1, progress)?;
             best = (left(&chosen)?, chosen);
         }
         if best.1.fit.set.is_empty() || best.0 < before {
@@ -130,9 +126,9 @@ impl Logs<'_> {
         Ok(Chosen { choice, exact, fit, ..chosen })
     }
 
-    /// Puts springs and play in the drives where an account of a joint with one leaves less of it than the set does, each at
+    /// Puts a spring or play in the drive of a joint where an account with it leaves less of that joint than the set does, at
     /// its exact law: once beside all else that was found, and once without what may have stood in for it.
-    fn drives(&self, best: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+    fn drive(&self, best: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
         let blocks = |chosen: &Chosen| -> Result<Vec<Vec<f64>>, EffectError> {
             let rows = self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows;
@@ -140,32 +136,33 @@ impl Logs<'_> {
         };
         let kinds = |chosen: &Chosen| select::kinds(&chosen.exact, &chosen.fit.set).len() as f64;
         let mut better: Option<(f64, Chosen)> = None;
-        for gone in [&DRIVE[..], &STANDS_IN] {
-            let goes = |candidate: &Candidate| gone.contains(&candidate.kind) && !candidate.turns();
-            let stay: Vec<usize> =
-                (0..best.exact.entries.len()).filter(|&i| !goes(&best.exact.entries[i].candidate)).collect();
-            if gone == STANDS_IN
-                && !best.exact.entries.iter().any(|e| goes(&e.candidate) && !DRIVE.contains(&e.candidate.kind))
-            {
-                continue;
-            }
-            let others: Vec<Candidate> = stay.iter().map(|&i| best.exact.entries[i].candidate.clone()).collect();
-            let (effects, side, alignment) = if gone == STANDS_IN {
-                let (exact, fit) = self.data(&best.noise).refine(&others)?;
-                (fit.effects(&exact, self.model), exact.side(&fit.set), fit.alignment())
+        let of = |kinds: &[Kind]| -> Vec<usize> {
+            let is = |&i: &usize| kinds.contains(&best.exact.entries[i].candidate.kind);
+            (0..best.exact.entries.len()).filter(is).collect()
+        };
+        let (rotors, stand_ins) = (of(&[Kind::Armature]), of(&STANDS_IN));
+        for gone in [&[Kind::Armature][..], &STANDS_IN] {
+            let all_but =
+                |out: &[usize]| (0..best.exact.entries.len()).filter(|i| !out.contains(i)).collect::<Vec<_>>();
+            let (effects, alignment) = if gone == STANDS_IN {
+                if stand_ins == rotors {
+                    continue;
+                }
+                let rest: Vec<Candidate> =
+                    all_but(&stand_ins).into_iter().map(|i| best.exact.entries[i].candidate.clone()).collect();
+                let (exact, fit) = self.data(&best.noise).refine(&rest)?;
+                (fit.effects(&exact, self.model), fit.alignment())
             } else {
-                let fit = Fit { set: stay.clone(), ..best.fit.clone() };
-                (fit.effects(&best.exact, self.model), best.exact.side(&stay), best.fit.alignment())
+                let fit = Fit { set: all_but(&rotors), ..best.fit.clone() };
+                (fit.effects(&best.exact, self.model), best.fit.alignment())
             };
-            for account in self.accounts(&effects, side, alignment)?.into_iter().take(ACCOUNTS) {
+            for account in self.accounts(&effects, alignment)?.into_iter().take(ACCOUNTS) {
                 let joint = account.drive.joints[0];
                 let rotor = Candidate::new(Kind::Armature, vec![joint]);
                 let Some(place) = best.all.entries.iter().position(|e| e.candidate == rotor) else { continue };
                 let leaves = |c: usize| {
                     let candidate = &best.all.entries[c].candidate;
-                    gone.contains(&candidate.kind)
-                        && !best.turned.iter().any(|t| t.place == c)
-                        && (gone == STANDS_IN || candidate.joints.contains(&joint))
+                    gone.contains(&candidate.kind) && (gone == STANDS_IN || candidate.joints.contains(&joint))
                 };
                 let mut set: Vec<usize> = best.choice.set.iter().copied().filter(|&c| !leaves(c)).collect();
                 set.push(place);
@@ -176,16 +173,13 @@ impl Logs<'_> {
                     drive: account.drive,
                     doubt: 0.5 * erfc(account.beyond / std::f64::consts::SQRT_2),
                 };
-                let turned: Vec<Turned> = best.turned.iter().cloned().chain([turned]).collect();
-                let next = self.converge(best.all.clone(), set, best.noise.clone(), turned, progress)?;
-                let there = |chosen: &Chosen| {
-                    chosen.exact.entries.iter().any(|e| e.candidate.turns() && e.candidate.joints == [joint])
-                };
+                let next = self.converge(best.all.clone(), set, best.noise.clone(), Some(turned), progress)?;
+                let there = next.exact.entries.iter().any(|e| e.candidate.turns());
                 let (before, after) = (blocks(&best)?, blocks(&next)?);
                 let own: Vec<f64> = (0..weights.len()).map(|j| if j == joint { weights[j] } else { 0.0 }).collect();
                 let typical = |weights: &[f64]| (gap::mean_level(&before, weights), gap::mean_level(&after, weights));
                 let ((before, after), (own_before, own_after)) = (typical(&weights), typical(&own));
-                if there(&next) && own_after < BETTER * own_before && after <= before {
+                if there && own_after < BETTER * own_before && after <= before {
                     let level = after * (1.0 + A_KIND * kinds(&next));
                     if better.as_ref().is_none_or(|(least, _)| level < *least) {
                         better = Some((level, next));
@@ -204,7 +198,7 @@ impl Logs<'_> {
         {
             chosen.choice.set.remove(worst);
             let (exact, fit) =
-                self.data(&chosen.noise).refine(&with_drives(&chosen.all, &chosen.choice.set, &chosen.turned))?;
+                self.data(&chosen.noise).refine(&with_drive(&chosen.all, &chosen.choice.set, &chosen.turned))?;
             let choice = select::evaluate(&chosen.all, chosen.choice.set);
             chosen = Chosen { exact, fit, choice, ..chosen };
         }
@@ -248,7 +242,7 @@ impl Logs<'_> {
         let mut all = data.problem(candidates.iter().map(open).collect(), &weighing);
         progress("choosing effects", 0.2);
         let choice = select::choose(&mut all, &self.band, &[]);
-        self.converge(all, choice.set, noise, Vec::new(), progress)
+        self.converge(all, choice.set, noise, None, progress)
     }
 
     /// From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
@@ -257,7 +251,7 @@ impl Logs<'_> {
         mut all: Problem,
         set: Vec<usize>,
         noise: Vec<f64>,
-        turned: Vec<Turned>,
+        turned: Option<Turned>,
         progress: Progress<'_>,
     ) -> Result<Chosen, EffectError> {
         let data = self.data(&noise);
@@ -267,7 +261,7 @@ impl Logs<'_> {
         loop {
             progress("refining effects", 0.3 + 0.08 * round as f64);
             round += 1;
-            let (exact, fit) = data.refine(&with_drives(&all, &choice.set, &turned))?;
+            let (exact, fit) = data.refine(&with_drive(&all, &choice.set, &turned))?;
             // The choice again, around the parameters found: knobs turned, and what bends taken into account.
             let changes: Vec<(usize, Candidate)> = choice
                 .set
@@ -297,7 +291,7 @@ impl Logs<'_> {
 }
 
 /// The candidates of a set, a drive in the place of its rotor.
-fn with_drives(problem: &Problem, set: &[usize], turned: &[Turned]) -> Vec<Candidate> {
+fn with_drive(problem: &Problem, set: &[usize], turned: &Option<Turned>) -> Vec<Candidate> {
     let own = |c: usize| turned.iter().find(|t| t.place == c).map(|t| t.drive.clone());
     set.iter().map(|&c| own(c).unwrap_or_else(|| problem.entries[c].candidate.clone())).collect()
 }

@@ -60,4 +60,4 @@ pub use torque_gain_error::TorqueGainError;
 pub use torque_ripple::TorqueRipple;
 pub use torque_saturation::TorqueSaturation;
 pub use viscous_friction::ViscousFriction;
-pub use wind_up::{JointRun, inertia_about};
+pub use wind_up::JointRun;

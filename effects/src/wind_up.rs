@@ -222,7 +222,7 @@ pub(crate) fn slope_about(model: &Model, data: &mut Data, motion: &Motion, joint
 const NUDGE: f64 = 1e-4;
 
 /// Inertia of a robot about one joint along a motion, the other joints held, sample by sample, kg m² (kg).
-pub fn inertia_about(model: &Model, data: &mut Data, motion: &Motion, joint: usize) -> Vec<f64> {
+pub(crate) fn inertia_about(model: &Model, data: &mut Data, motion: &Motion, joint: usize) -> Vec<f64> {
     let n = model.dof();
     let stride = ((EVERY / motion.dt) as usize).max(1);
     let (mut q, mut mass) = (vec![0.0; n], DMatrix::zeros(n, n));

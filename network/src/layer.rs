@@ -1,9 +1,9 @@
-//! A layer forward: the product in tiles of outputs and rows that stay in registers, then the activation.
+//! A layer forward: the product in tiles of outputs and rows that stay in registers (Goto and van de Geijn, Anatomy of
+//! high-performance matrix multiplication, 2008), then the activation.
 
 use crate::activation::Activation;
 use crate::real::Real;
 use crate::vector::{dispatched, times_plus};
-use std::ops::Range;
 
 dispatched!(
     /// y ← activation(W x + b) for each row of x, `[rows][inputs]`, and of y, `[rows][bias.len()]`; W column by column,
@@ -66,22 +66,33 @@ fn forward_body<T: Real, const REGISTER: usize>(
     activation: Activation,
 ) {
     if y.len() == bias.len() {
-        return in_tiles::<T, REGISTER, 64, 1>(weights, bias, x, y, activation);
+        one_row::<T, REGISTER>(weights, bias, x, y);
+        return activate::<T, REGISTER>(y, activation);
     }
-    // With four rows, four registers a row are 16 of 32, two are 8 of 16; the rest is for weights and inputs.
+    // Two registers of outputs by as many rows as leave room for weights and inputs: 12 sums of 16 registers, 16 of 32.
     match (REGISTER, T::BYTES) {
-        (64, 4) => in_tiles::<T, REGISTER, 64, 4>(weights, bias, x, y, activation),
-        (64, _) => in_tiles::<T, REGISTER, 32, 4>(weights, bias, x, y, activation),
-        (32, 4) => in_tiles::<T, REGISTER, 16, 4>(weights, bias, x, y, activation),
-        (16, 8) => in_tiles::<T, REGISTER, 4, 4>(weights, bias, x, y, activation),
-        _ => in_tiles::<T, REGISTER, 8, 4>(weights, bias, x, y, activation),
+        (64, 4) if bias.len() > 16 => in_panels::<T, REGISTER, 32, 8>(weights, bias, x, y, activation),
+        (64, 4) => in_panels::<T, REGISTER, 16, 8>(weights, bias, x, y, activation),
+        (64, _) if bias.len() > 8 => in_panels::<T, REGISTER, 16, 8>(weights, bias, x, y, activation),
+        (32, 4) if bias.len() > 8 => in_panels::<T, REGISTER, 16, 6>(weights, bias, x, y, activation),
+        (16, 8) => in_panels::<T, REGISTER, 4, 6>(weights, bias, x, y, activation),
+        _ => in_panels::<T, REGISTER, 8, 6>(weights, bias, x, y, activation),
     }
 }
 
-/// Eight rows at a time: their outputs are still in the first cache when the activation reads them. Outputs beyond the
-/// last wide tile go in narrow ones, of all eight rows.
+/// Rows that go through all weights together: with a panel they stay in the nearest caches.
+const ROWS: usize = 64;
+/// Inputs of a panel.
+const DEEP: usize = 128;
+
+/// Weights of some outputs, input by input; no register of them straddles two lines of the cache.
+#[repr(align(64))]
+struct Panel<T, const WIDE: usize>([[T; WIDE]; DEEP]);
+
+/// The weights in panels of some outputs, copied to where they lie one behind the other: as they are stored, a panel's rows
+/// share few sets of the first cache and push each other out of it.
 #[inline(always)]
-fn in_tiles<T: Real, const REGISTER: usize, const WIDE: usize, const ROWS: usize>(
+fn in_panels<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usize>(
     weights: &[T],
     bias: &[T],
     x: &[T],
@@ -89,75 +100,103 @@ fn in_tiles<T: Real, const REGISTER: usize, const WIDE: usize, const ROWS: usize
     activation: Activation,
 ) {
     let (inputs, outputs) = (weights.len() / bias.len(), bias.len());
-    let (wide, narrow) = (0..outputs / WIDE * WIDE, outputs / WIDE * WIDE..outputs);
-    for (x, y) in x.chunks(8 * inputs).zip(y.chunks_mut(8 * outputs)) {
-        affine::<T, REGISTER, WIDE, ROWS>(weights, bias, x, y, wide.clone());
-        match outputs {
-            8.. => affine::<T, REGISTER, 8, 8>(weights, bias, x, y, narrow.clone()),
-            4.. => affine::<T, REGISTER, 4, 8>(weights, bias, x, y, narrow.clone()),
-            _ => affine::<T, REGISTER, 1, 8>(weights, bias, x, y, narrow.clone()),
+    let mut panel = Panel([[T::ZERO; WIDE]; DEEP]);
+    for (x, y) in x.chunks(ROWS * inputs).zip(y.chunks_mut(ROWS * outputs)) {
+        y.chunks_exact_mut(outputs).for_each(|y| y.copy_from_slice(bias));
+        for first in (0..outputs).step_by(WIDE) {
+            let wide = WIDE.min(outputs - first);
+            for from in (0..inputs).step_by(DEEP) {
+                let deep = DEEP.min(inputs - from);
+                // What stands behind the last output is nobody's: it is computed and not kept.
+                for (panel, weights) in panel.0.iter_mut().zip(weights[from * outputs..].chunks_exact(outputs)) {
+                    copy(panel, &weights[first..], wide);
+                }
+                let rows = y.len() / outputs;
+                let mut row = 0;
+                while row < rows {
+                    let (x, y) = (&x[row * inputs + from..], &mut y[row * outputs + first..]);
+                    row += match rows - row {
+                        left if left >= TALL => {
+                            tile::<T, REGISTER, WIDE, TALL>(&panel.0[..deep], x, inputs, y, outputs, wide)
+                        }
+                        2.. => tile::<T, REGISTER, WIDE, 2>(&panel.0[..deep], x, inputs, y, outputs, wide),
+                        _ => tile::<T, REGISTER, WIDE, 1>(&panel.0[..deep], x, inputs, y, outputs, wide),
+                    };
+                }
+            }
         }
         activate::<T, REGISTER>(y, activation);
     }
 }
 
-/// Some of the outputs of W x + b, in tiles of N outputs and R rows.
+/// Adds a panel's product with R rows of x, each `inputs` behind the one before, to `wide` outputs of as many rows of y;
+/// R.
 #[inline(always)]
-fn affine<T: Real, const REGISTER: usize, const N: usize, const R: usize>(
-    weights: &[T],
-    bias: &[T],
+fn tile<T: Real, const REGISTER: usize, const WIDE: usize, const R: usize>(
+    panel: &[[T; WIDE]],
     x: &[T],
+    inputs: usize,
     y: &mut [T],
-    outputs: Range<usize>,
-) {
-    let inputs = weights.len() / bias.len();
-    for (x, y) in x.chunks(R * inputs).zip(y.chunks_mut(R * bias.len())) {
-        if x.len() == R * inputs {
-            tiles::<T, REGISTER, N, R>(weights, bias, x, y, outputs.clone());
-        } else {
-            for (x, y) in x.chunks_exact(inputs).zip(y.chunks_exact_mut(bias.len())) {
-                tiles::<T, REGISTER, N, 1>(weights, bias, x, y, outputs.clone());
+    outputs: usize,
+    wide: usize,
+) -> usize {
+    assert!(x.len() >= (R - 1) * inputs + panel.len() && wide <= WIDE);
+    let mut sum = [[T::ZERO; WIDE]; R];
+    for r in 0..R {
+        copy(&mut sum[r], &y[r * outputs..], wide);
+    }
+    for (k, weights) in panel.iter().enumerate() {
+        for r in 0..R {
+            // SAFETY: r < R and k < panel.len(); the length was checked above. Checks in here cost registers: with them the
+            // sums live in memory, at a third of the speed.
+            let x = unsafe { *x.get_unchecked(r * inputs + k) };
+            for i in 0..WIDE {
+                sum[r][i] = times_plus::<T, REGISTER>(weights[i], x, sum[r][i]);
             }
         }
     }
+    for r in 0..R {
+        match y[r * outputs..].first_chunk_mut::<WIDE>() {
+            Some(y) if wide == WIDE => *y = sum[r],
+            _ => y[r * outputs..][..wide].copy_from_slice(&sum[r][..wide]),
+        }
+    }
+    R
 }
 
-/// The same for R rows. The last tile overlaps the one before where N does not divide the outputs.
+/// The first `wide` of N numbers, the others left as they are or overwritten: without a call where there are N.
 #[inline(always)]
-fn tiles<T: Real, const REGISTER: usize, const N: usize, const R: usize>(
-    weights: &[T],
-    bias: &[T],
-    x: &[T],
-    y: &mut [T],
-    outputs: Range<usize>,
-) {
-    let (inputs, width) = (x.len() / R, bias.len());
-    assert!(x.len() == R * inputs && weights.len() == inputs * width && outputs.end <= width);
-    assert!(outputs.is_empty() || outputs.end >= N);
-    let mut next = outputs.start;
-    while next < outputs.end {
-        let from = next.min(outputs.end - N);
-        let mut sum = [[T::ZERO; N]; R];
-        for r in 0..R {
-            sum[r].copy_from_slice(&bias[from..from + N]);
-        }
-        for k in 0..inputs {
-            for r in 0..R {
-                // SAFETY: r < R and k < inputs; the lengths were checked above. Checks in here cost registers: with them
-                // the sums live in memory, at a third of the speed.
-                let x = unsafe { *x.get_unchecked(r * inputs + k) };
-                for i in 0..N {
-                    // SAFETY: from + i < outputs.end <= width.
-                    let weight = unsafe { *weights.get_unchecked(k * width + from + i) };
-                    sum[r][i] = times_plus::<T, REGISTER>(weight, x, sum[r][i]);
-                }
+fn copy<T: Real, const N: usize>(to: &mut [T; N], from: &[T], wide: usize) {
+    match from.first_chunk::<N>() {
+        Some(from) => *to = *from,
+        None => to[..wide].copy_from_slice(&from[..wide]),
+    }
+}
+
+/// W x + b of one row: its outputs in as many registers as there are, the weights as they are stored.
+#[inline(always)]
+fn one_row<T: Real, const REGISTER: usize>(weights: &[T], bias: &[T], x: &[T], y: &mut [T]) {
+    match bias.len() {
+        64.. => some_outputs::<T, REGISTER, 64>(weights, bias, x, y),
+        8.. => some_outputs::<T, REGISTER, 8>(weights, bias, x, y),
+        _ => some_outputs::<T, REGISTER, 1>(weights, bias, x, y),
+    }
+}
+
+/// The same, N outputs at a time. The last ones overlap those before where N does not divide the outputs.
+#[inline(always)]
+fn some_outputs<T: Real, const REGISTER: usize, const N: usize>(weights: &[T], bias: &[T], x: &[T], y: &mut [T]) {
+    let outputs = bias.len();
+    for next in (0..outputs).step_by(N) {
+        let from = next.min(outputs - N);
+        let mut sum = [T::ZERO; N];
+        sum.copy_from_slice(&bias[from..from + N]);
+        for (x, weights) in x.iter().zip(weights.chunks_exact(outputs)) {
+            for (sum, weight) in sum.iter_mut().zip(&weights[from..from + N]) {
+                *sum = times_plus::<T, REGISTER>(*weight, *x, *sum);
             }
         }
-        for r in 0..R {
-            let y = &mut y[r * width + from..][..N];
-            y[..N].copy_from_slice(&sum[r][..N]);
-        }
-        next = from + N;
+        y[from..from + N].copy_from_slice(&sum);
     }
 }
 

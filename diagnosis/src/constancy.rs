@@ -31,7 +31,9 @@ pub fn inconsistent(problem: &Problem, fit: &Fit, signals: &[Signals], band: &Ba
             let asked = |joint: &Option<usize>| joint.is_none_or(|j| candidate.joints.contains(&j));
             let apart = thirds
                 .iter()
-                .filter(|(joint, _)| asked(joint) && !OF_THE_MOMENT.contains(&candidate.kind))
+                .filter(|(joint, _)| {
+                    asked(joint) && !OF_THE_MOMENT.contains(&candidate.kind) && !candidate.kind.is_outside()
+                })
                 .map(|(_, thirds)| apart(problem, c, thirds))
                 .fold(0.0, f64::max);
             (apart > APART).then_some((c, apart))

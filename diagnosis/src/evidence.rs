@@ -71,7 +71,7 @@ fn curves(
 ) -> Vec<EffectCurve> {
     // What each kind adds to each joint, at the rows.
     let mut parts: BTreeMap<(Kind, usize), Vec<f64>> = BTreeMap::new();
-    for &c in &fit.set {
+    for &c in fit.set.iter().filter(|&&c| !problem.entries[c].candidate.kind.is_outside()) {
         let entry = &problem.entries[c];
         let theta: Vec<f64> = fit
             .columns

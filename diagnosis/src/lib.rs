@@ -21,6 +21,7 @@ mod floor;
 mod gap;
 mod horizon;
 mod kernel;
+mod late;
 mod learner;
 mod power;
 mod problem;

@@ -29,8 +29,9 @@ struct Gauge {
 pub fn power(model: &Model, problem: &Problem, set: &[usize]) -> Vec<Power> {
     let mut places: Vec<(usize, &[usize])> = Vec::new();
     for entry in &problem.entries {
-        let order = Kind::ALL.iter().position(|kind| *kind == entry.candidate.kind).unwrap_or_default();
-        places.push((order, &entry.candidate.joints));
+        if let Some(order) = Kind::ALL.iter().position(|kind| *kind == entry.candidate.kind) {
+            places.push((order, &entry.candidate.joints));
+        }
     }
     places.sort();
     places.dedup();
@@ -111,7 +112,7 @@ fn gauges(model: &Model, candidate: &Candidate) -> Vec<Gauge> {
         Kind::ActuatorLag => along("time_constant", &[1.0]),
         Kind::GravityMisalignment => return vec![along("roll", &[0.0, 1.0]), along("pitch", &[1.0, 0.0])],
         // When something pushes is not known before; a limit is no coefficient; spring and play have no column.
-        Kind::ExternalContact | Kind::TorqueSaturation | Kind::JointElasticity | Kind::Backlash => return Vec::new(),
+        _ => return Vec::new(),
     };
     vec![one]
 }

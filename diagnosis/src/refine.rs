@@ -78,7 +78,7 @@ impl Data<'_> {
                 for (x, n) in exact.iter_mut().zip(&nominal) {
                     x.iter_mut().zip(n).for_each(|(x, n)| *x -= n);
                 }
-                for &c in &fit.set {
+                for &c in fit.set.iter().filter(|&&c| !problem.entries[c].candidate.kind.is_outside()) {
                     let (_, theta) = fit.own(problem, c);
                     for (column, theta) in problem.entries[c].candidate.columns(&motion).iter().zip(theta) {
                         for (j, torque) in &column.rows {

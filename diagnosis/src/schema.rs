@@ -238,8 +238,31 @@ pub struct Unexplained {
     /// above the floor.
     #[serde(default)]
     pub learnable: f64,
+    /// What it is like, where laws that the catalogue does not have account for it; the laws are no effects, and the
+    /// corrected model has none of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resembles: Option<Resemblance>,
     /// Where it sits.
     pub regimes: Vec<Regime>,
+}
+
+/// What is left, told by laws that the catalogue does not have.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Resemblance {
+    /// The laws.
+    pub laws: Vec<Lookalike>,
+    /// Part of the squared gap left above the floor that they account for on held-out data, 0 to 1.
+    pub share: f64,
+}
+
+/// A law that the catalogue does not have.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Lookalike {
+    /// `link_drag` (of a medium, with the square of a link's speed), `joint_drag` (in a joint, faster than with its speed),
+    /// `swing` (a mass that swings on a link), `rub` and `catch` (dry friction, torque at some places of a joint's travel).
+    pub law: String,
+    /// The joints, or those that move the links.
+    pub joints: Vec<String>,
 }
 
 /// How far the gap shrinks on held-out data.

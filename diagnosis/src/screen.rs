@@ -1,12 +1,14 @@
 //! A first look at knobs with too many places to try: only the best few go on.
 
 use crate::refine::Data;
-use gapscope_effects::{Candidate, Range};
+use gapscope_effects::{Candidate, Kind, Range};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Ripples of one joint that go on.
 const RIPPLES: usize = 2;
+/// Places of one joint that go on, of rubs and of catches.
+const PLACES: usize = 6;
 /// Two ripples are apart if their cycles differ by this factor.
 const APART: f64 = 1.15;
 /// Powers of the position that a ripple must be seen beside: pose moves torque too, but slowly.
@@ -15,6 +17,49 @@ const POWERS: i32 = 5;
 /// The ripples that take most out of each joint's residual (`[episode][joint][signal]`) beside a smooth function of pose
 /// and speed.
 pub fn ripples(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>]) -> Vec<Candidate> {
+    per_joint(
+        data,
+        ranges,
+        residuals,
+        |j| Candidate::ripples(j, &ranges[j]),
+        |scored| {
+            let mut kept: Vec<Candidate> = Vec::new();
+            for candidate in scored {
+                let ratio = |other: &Candidate| (candidate.shape / other.shape).max(other.shape / candidate.shape);
+                if kept.len() < RIPPLES && kept.iter().all(|other| ratio(other) > APART) {
+                    kept.push(candidate);
+                }
+            }
+            kept
+        },
+    )
+}
+
+/// The places of each joint's travel at which friction or torque of their own would take most out of it.
+pub fn places(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>]) -> Vec<Candidate> {
+    let of = |kind| {
+        per_joint(
+            data,
+            ranges,
+            residuals,
+            |j| Candidate::places(kind, j, &ranges[j]),
+            |mut scored| {
+                scored.truncate(PLACES);
+                scored
+            },
+        )
+    };
+    [of(Kind::Rub), of(Kind::Catch)].concat()
+}
+
+/// For each joint that moves, what `keep` keeps of its candidates, the one that takes most out of the residual first.
+fn per_joint(
+    data: &Data<'_>,
+    ranges: &[Range],
+    residuals: &[Vec<Vec<f64>>],
+    candidates: impl Fn(usize) -> Vec<Candidate> + Sync,
+    keep: impl Fn(Vec<Candidate>) -> Vec<Candidate> + Sync,
+) -> Vec<Candidate> {
     let joints: Vec<usize> = (0..ranges.len()).filter(|&j| data.moving[j]).collect();
     joints
         .into_par_iter()
@@ -36,8 +81,7 @@ pub fn ripples(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>]) -
                 data.signals[e].v[j].iter().map(|v| (v / data.standstill[j]).clamp(-1.0, 1.0)).collect()
             }));
             let target = at_rows(&|e| residuals[e][j].clone());
-            let rows = target.len();
-            let x = DMatrix::from_fn(rows, base.len(), |r, c| base[c][r]);
+            let x = DMatrix::from_fn(target.len(), base.len(), |r, c| base[c][r]);
             let q = x.qr().q();
             let project = |y: &[f64]| {
                 let y = DVector::from_column_slice(y);
@@ -45,36 +89,22 @@ pub fn ripples(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>]) -
                 y - inside
             };
             let rest = project(&target);
-            let mut scored: Vec<(f64, Candidate)> = Candidate::ripples(j, &ranges[j])
-                .into_iter()
-                .map(|candidate| {
-                    let runs: Vec<_> = data
-                        .signals
-                        .iter()
-                        .map(|s| candidate.columns(&s.motion(data.model, data.standstill)))
-                        .collect();
-                    let wave = |i: usize| project(&at_rows(&|e| runs[e][i].rows[0].1.clone()));
-                    let (s, c) = (wave(0), wave(1));
-                    let (ss, sc, cc) = (s.norm_squared(), s.dot(&c), c.norm_squared());
-                    let (sy, cy) = (s.dot(&rest), c.dot(&rest));
-                    let determinant = ss * cc - sc * sc;
-                    let gain = if determinant > 1e-9 * ss * cc {
-                        (cc * sy * sy - 2.0 * sc * sy * cy + ss * cy * cy) / determinant
-                    } else {
-                        0.0
-                    };
-                    (gain, candidate)
-                })
-                .collect();
+            let gain = |candidate: &Candidate| {
+                let runs: Vec<_> =
+                    data.signals.iter().map(|s| candidate.columns(&s.motion(data.model, data.standstill))).collect();
+                let columns: Vec<DVector<f64>> =
+                    (0..runs[0].len()).map(|i| project(&at_rows(&|e| runs[e][i].rows[0].1.clone()))).collect();
+                let k = columns.len();
+                let gram = DMatrix::from_fn(k, k, |a, b| columns[a].dot(&columns[b]));
+                let moment = DVector::from_fn(k, |a, _| columns[a].dot(&rest));
+                // Two columns that are one tell nothing.
+                let apart = gram.determinant() > 1e-9 * gram.diagonal().product();
+                gram.cholesky().filter(|_| apart).map_or(0.0, |f| moment.dot(&f.solve(&moment)))
+            };
+            let mut scored: Vec<(f64, Candidate)> = candidates(j).into_iter().map(|c| (gain(&c), c)).collect();
+            scored.retain(|(gain, _)| *gain > 0.0);
             scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let mut kept: Vec<Candidate> = Vec::new();
-            for (gain, candidate) in scored {
-                let ratio = |other: &Candidate| (candidate.shape / other.shape).max(other.shape / candidate.shape);
-                if gain > 0.0 && kept.len() < RIPPLES && kept.iter().all(|other| ratio(other) > APART) {
-                    kept.push(candidate);
-                }
-            }
-            kept
+            keep(scored.into_iter().map(|(_, candidate)| candidate).collect())
         })
         .collect()
 }

@@ -20,6 +20,8 @@ use statrs::function::erf::erfc;
 const CLEAR: f64 = 8.0;
 /// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
 const MANY: usize = 3;
+/// Laws outside the catalogue are let in where with them this part of the gap is left.
+const OPEN: f64 = 0.7;
 /// Another account of a drive is better where it leaves this part of the gap.
 const BETTER: f64 = 0.95;
 /// Times that the choice is made, each around the exact parameters of the one before.
@@ -62,6 +64,17 @@ pub(crate) struct Chosen {
     pub noise: Vec<f64>,
     /// Spring or play in the drive of a joint, in the place of its rotor.
     pub turned: Option<Turned>,
+    /// Probability that a delay is a lag, or a lag a delay, where one is there and they were compared.
+    pub late_doubt: Option<f64>,
+}
+
+/// A choice held against the plant.
+struct Tried {
+    chosen: Chosen,
+    /// Kinds of its set.
+    kinds: Vec<Kind>,
+    /// Held-out gap with it, as a part of the effort's variation.
+    left: f64,
 }
 
 /// A drive that turns on its own.
@@ -80,50 +93,57 @@ impl Logs<'_> {
     ///
     /// What the normal equations promise is held against the torque that the plant really predicts on held-out data. Where
     /// many kinds stand together or leave much, flexible laws may have bent to what none of them is: then the linear kinds
-    /// alone have their turn, and stay if they predict as well with no more of them. A set that makes the gap larger is no explanation: then the next choice
-    /// does without the kinds that promise most.
+    /// alone have their turn, and stay if they predict as well with no more of them. Where much is left, laws outside the
+    /// catalogue compete, so that effects are chosen beside what they do not explain instead of bent to it. A set that makes
+    /// the gap larger is no explanation: then the next choice does without the kinds that promise most.
     pub(crate) fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
         let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, |_| true)), &weights);
-        let left = |chosen: &Chosen| -> Result<f64, EffectError> {
-            Ok(rms(&self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows))
-        };
         let before = rms(&self.nominal_rows());
-        let chosen = self.choose_among(&[], progress)?;
-        let mut best = (left(&chosen)?, chosen);
+        // What the set leaves, beside what laws outside the catalogue in it account for.
+        let tried = |chosen: Chosen| -> Result<Tried, EffectError> {
+            let rows = self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows;
+            let left = rms(&self.beside_outside(&chosen.exact, &chosen.fit.set, &rows));
+            Ok(Tried { kinds: select::kinds(&chosen.exact, &chosen.fit.set), left, chosen })
+        };
+        let without = |kinds: &[Kind]| -> Result<Tried, EffectError> {
+            tried(self.choose_among(&[kinds, &Kind::OUTSIDE].concat(), progress)?)
+        };
+        let mut best = without(&[])?;
+        let floor = best.chosen.noise.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>();
+        let floor = gap::weighted_rms(&floor, &weights);
+        let judged = |tried: &Tried| verdict::Judged { before, after: tried.left, floor };
         let flexible: Vec<Kind> = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k)).collect();
-        let bends = |chosen: &Chosen| chosen.exact.entries.iter().any(|e| flexible.contains(&e.candidate.kind));
-        let floor = gap::weighted_rms(&best.1.noise.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &weights);
-        let judged = |after: f64| verdict::Judged { before, after, floor };
-        let count = |chosen: &Chosen| select::kinds(&chosen.exact, &chosen.fit.set).len();
-        let many = count(&best.1) >= MANY;
-        if bends(&best.1) && (many || judged(best.0).leaves_much()) {
-            let linear = self.choose_among(&flexible, progress)?;
-            let after = left(&linear)?;
-            if after <= best.0 && count(&linear) <= count(&best.1) {
-                best = (after, linear);
+        let bends = best.kinds.iter().any(|kind| flexible.contains(kind));
+        if bends && (best.kinds.len() >= MANY || judged(&best).leaves_much()) {
+            let linear = without(&flexible)?;
+            if linear.left <= best.left && linear.kinds.len() <= best.kinds.len() {
+                best = linear;
             }
         }
-        let stands_in = |chosen: &Chosen| chosen.exact.entries.iter().any(|e| STANDS_IN.contains(&e.candidate.kind));
-        let rest = judged(best.0);
-        let explained_otherwise = stands_in(&best.1) && rest.unexplained_fraction() > ALL_BUT;
-        if best.0 > UNNOTICED && (rest.leaves_any() || explained_otherwise) {
-            let chosen = self.drive(best.1, progress)?;
-            best = (left(&chosen)?, chosen);
+        let mut open = None;
+        if judged(&best).leaves_much() {
+            open = Some(tried(self.choose_among(&[], progress)?)?).filter(|open| open.left < OPEN * best.left);
         }
-        if best.1.fit.set.is_empty() || best.0 < before {
-            if judged(best.0).leaves_most() {
-                return self.constant(best.1);
-            }
-            return Ok(best.1);
+        let all_said = open.as_ref().is_some_and(|open| !judged(open).leaves_any());
+        let stands_in = best.kinds.iter().any(|kind| STANDS_IN.contains(kind));
+        let explained_otherwise = stands_in && judged(&best).unexplained_fraction() > ALL_BUT;
+        if !all_said && best.left > UNNOTICED && (judged(&best).leaves_any() || explained_otherwise) {
+            best = tried(self.drive(best.chosen, progress)?)?;
         }
-        let chosen = self.choose_among(&INERTIAL, progress)?;
-        if chosen.fit.set.is_empty() || left(&chosen)? < before {
-            return Ok(chosen);
+        if let Some(open) = open.filter(|open| open.left < best.left) {
+            return self.constant(open.chosen);
         }
-        let choice = select::evaluate(&chosen.all, Vec::new());
-        let (exact, fit) = self.data(&chosen.noise).refine(&[])?;
-        Ok(Chosen { choice, exact, fit, ..chosen })
+        if best.kinds.is_empty() || best.left < before {
+            return if judged(&best).leaves_most() { self.constant(best.chosen) } else { Ok(best.chosen) };
+        }
+        let modest = without(&INERTIAL)?;
+        if modest.kinds.is_empty() || modest.left < before {
+            return Ok(modest.chosen);
+        }
+        let choice = select::evaluate(&modest.chosen.all, Vec::new());
+        let (exact, fit) = self.data(&modest.chosen.noise).refine(&[])?;
+        Ok(Chosen { choice, exact, fit, ..modest.chosen })
     }
 
     /// Puts a spring or play in the drive of a joint where an account with it leaves less of that joint than the set does, at
@@ -232,13 +252,17 @@ impl Logs<'_> {
             .collect();
         candidates.retain(|c| c.kind != Kind::TorqueSaturation || c.shape > typical[c.joints[0]]);
         candidates.extend(screen::ripples(&data, &ranges, &residuals));
+        if Kind::OUTSIDE.iter().any(|kind| !forbidden.contains(kind)) {
+            candidates.extend(Candidate::outside(self.model));
+            candidates.extend(screen::places(&data, &ranges, &residuals));
+        }
         if self.signals.iter().any(|s| !s.pushed.is_empty()) {
             candidates.extend(Candidate::contacts(self.model));
         }
         candidates.retain(|c| !forbidden.contains(&c.kind));
         let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
         // A push is known by when it comes: it is no outlier.
-        let weighing = [&Kind::LINEAR[..], &[Kind::ExternalContact]].concat();
+        let weighing = [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact]].concat();
         let mut all = data.problem(candidates.iter().map(open).collect(), &weighing);
         progress("choosing effects", 0.2);
         let choice = select::choose(&mut all, &self.band, &[]);
@@ -271,7 +295,7 @@ impl Logs<'_> {
                 .map(|(&c, e)| (c, e.candidate.clone()))
                 .collect();
             if round == ROUNDS || choice.set.is_empty() {
-                return Ok(Chosen { all, choice, exact, fit, noise, turned });
+                return Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt: None });
             }
             all.replace(self.model, &self.signals, &self.band, &self.still, &changes);
             let at: Vec<usize> = (0..exact.entries.len()).collect();
@@ -284,14 +308,14 @@ impl Logs<'_> {
             let same = again.set == choice.set;
             choice = again;
             if same {
-                return Ok(Chosen { all, choice, exact, fit, noise, turned });
+                return Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt: None });
             }
         }
     }
 }
 
 /// The candidates of a set, a drive in the place of its rotor.
-fn with_drive(problem: &Problem, set: &[usize], turned: &Option<Turned>) -> Vec<Candidate> {
+pub(crate) fn with_drive(problem: &Problem, set: &[usize], turned: &Option<Turned>) -> Vec<Candidate> {
     let own = |c: usize| turned.iter().find(|t| t.place == c).map(|t| t.drive.clone());
     set.iter().map(|&c| own(c).unwrap_or_else(|| problem.entries[c].candidate.clone())).collect()
 }
@@ -312,6 +336,7 @@ fn ranges(model: &Model, signals: &[Signals]) -> Vec<Range> {
             let torque = sorted(&|s| s.nominal[j].iter().map(|t| t.abs()).collect());
             Range {
                 speed: quantile(&speed, 0.98),
+                least: place.first().copied().unwrap_or(0.0),
                 span: place.last().zip(place.first()).map_or(0.0, |(last, first)| last - first),
                 torque: quantile(&torque, 0.995),
                 duration: signals.iter().map(|s| s.len() as f64 * s.dt).fold(0.0, f64::max),

@@ -211,6 +211,7 @@ fn grow(problem: &Problem, mut choice: Choice) -> Choice {
 pub fn rivals(problem: &Problem, choice: &Choice) -> Vec<Rival> {
     kinds(problem, &choice.set)
         .into_iter()
+        .filter(|kind| !kind.is_outside())
         .map(|without| {
             let rest: Vec<usize> =
                 choice.set.iter().copied().filter(|&c| problem.entries[c].candidate.kind != without).collect();
@@ -243,7 +244,7 @@ pub fn evaluate(problem: &Problem, mut set: Vec<usize>) -> Choice {
 
 /// Held-out deviance and cost of complexity of a set.
 fn objective(problem: &Problem, set: &[usize]) -> f64 {
-    if kinds(problem, set).len() > KINDS_AT_MOST {
+    if kinds(problem, set).iter().filter(|kind| !kind.is_outside()).count() > KINDS_AT_MOST {
         return f64::INFINITY;
     }
     problem.held_out_total(set) + cost(problem, set)

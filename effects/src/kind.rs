@@ -51,6 +51,16 @@ pub enum Kind {
     JointZeroOffset,
     /// An outside force for some of the time.
     ExternalContact,
+    /// Outside the catalogue: drag of a medium on a link.
+    LinkDrag,
+    /// Outside the catalogue: drag in a joint, of a power of its speed.
+    JointDrag,
+    /// Outside the catalogue: a mass that swings on the last link.
+    Swing,
+    /// Outside the catalogue: dry friction at one place of a joint's travel.
+    Rub,
+    /// Outside the catalogue: torque at one place of a joint's travel.
+    Catch,
 }
 
 impl Kind {
@@ -94,6 +104,14 @@ impl Kind {
         Kind::JointCoupling,
     ];
 
+    /// Laws that the catalogue does not have: what its effects are held against. No [`crate::Effect`] is of such a kind.
+    pub const OUTSIDE: [Kind; 5] = [Kind::LinkDrag, Kind::JointDrag, Kind::Swing, Kind::Rub, Kind::Catch];
+
+    /// Whether the catalogue does not have it.
+    pub fn is_outside(self) -> bool {
+        Kind::OUTSIDE.contains(&self)
+    }
+
     /// The public name, e.g. `coulomb_friction`.
     pub fn name(self) -> &'static str {
         match self {
@@ -119,6 +137,11 @@ impl Kind {
             Kind::Backlash => "backlash",
             Kind::JointZeroOffset => "joint_zero_offset",
             Kind::ExternalContact => "external_contact",
+            Kind::LinkDrag => "link_drag",
+            Kind::JointDrag => "joint_drag",
+            Kind::Swing => "swing",
+            Kind::Rub => "rub",
+            Kind::Catch => "catch",
         }
     }
 }
@@ -135,7 +158,7 @@ mod tests {
 
     #[test]
     fn the_name_is_the_one_that_serde_writes() {
-        for kind in Kind::ALL {
+        for kind in Kind::ALL.into_iter().chain(Kind::OUTSIDE) {
             assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
         }
     }

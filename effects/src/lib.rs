@@ -19,6 +19,7 @@ mod kind;
 mod link_inertia_error;
 mod load_dependent_friction;
 mod motion;
+mod outside;
 mod parallel_spring;
 mod payload;
 mod plant;

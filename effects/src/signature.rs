@@ -8,8 +8,8 @@ use crate::{
     JointElasticity, JointZeroOffset, Kind, LoadDependentFriction, Motion, ParallelSpring, PreslidingFriction,
     StribeckFriction, ThermalDrift, TorqueBias, TorqueGainError, TorqueRipple, TorqueSaturation, ViscousFriction,
     actuation_delay, actuator_lag, armature, coulomb_friction, external_contact, gravity_misalignment, joint_coupling,
-    joint_elasticity, joint_zero_offset, link_inertia_error, load_dependent_friction, parallel_spring, payload,
-    presliding_friction, stribeck_friction, thermal_drift, torque_bias, torque_gain_error, torque_ripple,
+    joint_elasticity, joint_zero_offset, link_inertia_error, load_dependent_friction, outside, parallel_spring,
+    payload, presliding_friction, stribeck_friction, thermal_drift, torque_bias, torque_gain_error, torque_ripple,
     torque_saturation, viscous_friction,
 };
 use gapscope_dynamics::{JointKind, Model};
@@ -54,7 +54,8 @@ pub struct Candidate {
     pub joints: Vec<usize>,
     /// The knob, 0 for kinds that have none: weight of the second joint of a coupling, Stribeck velocity (rad/s),
     /// σ/f of bristles (1/rad), time constant of a drift or a lag (s), cycles of a ripple, limit of a saturation (N m),
-    /// delay (s), resonance of a link on its locked motor (Hz), gap of a play (rad).
+    /// delay (s), resonance of a link on its locked motor (Hz), gap of a play (rad), power of the speed in a joint's drag,
+    /// frequency of a mass that swings (Hz), place of a rub or a catch (rad).
     pub shape: f64,
     /// Inertia of the link about the joint in the logs, kg m² (kg), for elasticity.
     pub inertia: f64,
@@ -69,6 +70,8 @@ pub struct Candidate {
 pub struct Range {
     /// Speed that it hardly exceeds, rad/s (m/s).
     pub speed: f64,
+    /// Least position, rad (m).
+    pub least: f64,
     /// From its least to its greatest position, rad (m).
     pub span: f64,
     /// Torque that its motion hardly ever takes more of, by the nominal model, N m (N).
@@ -87,6 +90,10 @@ const DRIFT: [f64; 5] = [0.06, 0.15, 0.35, 0.8, 2.0];
 const LIMIT: [f64; 9] = [0.75, 0.85, 0.92, 0.97, 1.0, 1.04, 1.1, 1.2, 1.4];
 /// Delays and lags, s.
 const LATE: [f64; 4] = [0.002, 0.006, 0.012, 0.025];
+/// Powers of the speed in a joint's drag.
+const DRAG: [f64; 2] = [2.0, 3.0];
+/// Frequencies of a mass that swings, Hz: the least, from one to the next, and the greatest.
+const SWING: (f64, f64, f64) = (0.5, 1.1, 6.0);
 /// Cycles of a ripple: at least one and a half over the span; above that by this part of what the span resolves.
 const RIPPLE: (f64, f64, usize) = (1.5, 0.35, 60);
 
@@ -148,6 +155,26 @@ impl Candidate {
         }
         all.retain(|c| c.shape.is_finite() && c.shape > 0.0);
         all
+    }
+
+    /// Laws outside the catalogue: drag on each link and in each joint, a mass that swings on each leaf, ...
+    pub fn outside(model: &Model) -> Vec<Candidate> {
+        let mut all: Vec<Candidate> = (0..model.dof()).map(|j| Candidate::new(Kind::LinkDrag, vec![j])).collect();
+        for shape in DRAG {
+            all.extend((0..model.dof()).map(|j| Candidate { shape, ..Candidate::new(Kind::JointDrag, vec![j]) }));
+        }
+        let is_leaf = |j: &usize| model.joints().iter().all(|child| child.parent != Some(*j));
+        let frequencies = std::iter::successors(Some(SWING.0), |f| (f * SWING.1 < SWING.2).then_some(f * SWING.1));
+        for shape in frequencies {
+            let swing = |j| Candidate { shape, ..Candidate::new(Kind::Swing, vec![j]) };
+            all.extend((0..model.dof()).filter(is_leaf).map(swing));
+        }
+        all
+    }
+
+    /// ... and rubs or catches, one or the other, at each place of a joint's travel.
+    pub fn places(kind: Kind, joint: usize, range: &Range) -> Vec<Candidate> {
+        outside::places(range).map(|shape| Candidate { shape, ..Candidate::new(kind, vec![joint]) }).collect()
     }
 
     /// Whether it is a drive that turns on its own: a spring or play.
@@ -217,11 +244,17 @@ impl Candidate {
             (Kind::ExternalContact, &[j]) => external_contact::signature(motion, j),
             (Kind::ActuationDelay, _) => actuation_delay::signature(motion, self.shape),
             (Kind::ActuatorLag, _) => actuator_lag::signature(motion, self.shape),
+            (Kind::LinkDrag, &[j]) => outside::link_drag(motion, j),
+            (Kind::JointDrag, &[j]) => outside::joint_drag(motion, j, self.shape),
+            (Kind::Swing, &[j]) => outside::swing(motion, j, self.shape),
+            (Kind::Rub, &[j]) => outside::rub(motion, j, self.shape),
+            (Kind::Catch, &[j]) => outside::catch(motion, j, self.shape),
             _ => Vec::new(),
         }
     }
 
-    /// The effects with these coefficients, in the order of [`Candidate::columns`]; none where no physical effect has them.
+    /// The effects with these coefficients, in the order of [`Candidate::columns`]; none where no physical effect has them,
+    /// and for laws outside the catalogue.
     /// An elastic drive and play come with their rotor's inertia.
     pub fn effects(&self, model: &Model, coefficients: &[f64]) -> Vec<Effect> {
         let name = |j: usize| model.joints()[j].name.clone();

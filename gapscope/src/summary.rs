@@ -5,8 +5,8 @@ mod change;
 use crate::report::terminal::{INDENT, Paint, WIDTH, block, blocks, column, cut, cut_to, fill, pad, wrap};
 use crate::report::{
     NONE, capital, changed, count, effect, estimate, figure, headline, implied_unit, interval, is_above_floor,
-    joint_list, largest, learnable, motion_unit, outstanding, percent, percent_figure, plain, power_line,
-    probability_figure, regime, said_of, significant, span, verdict, with_unit,
+    joint_list, largest, motion_unit, outstanding, percent, percent_figure, plain, power_line, probability_figure,
+    regime, said_of, significant, span, verdict, with_unit, words_of_the_rest,
 };
 use change::{Cells, change_sign};
 use gapscope_diagnosis::schema::{Diagnosis, Estimate, Evaluation, FoundEffect, Parameter, Regime, Shrink, Verdict};
@@ -267,7 +267,7 @@ fn notes(diagnosis: &Diagnosis) -> Vec<String> {
         rows.push(cut_to(&format!("or {kinds} ({})", percent(other.probability)), WIDTH - INDENT));
     }
     if matches!(diagnosis.verdict, Verdict::PartlyExplained | Verdict::UnknownEffect) {
-        rows.extend(wrap(&learnable(&diagnosis.unexplained), 2));
+        rows.extend(wrap(&words_of_the_rest(&diagnosis.unexplained, &diagnosis.joints), 2));
     }
     rows.extend(findings.iter().take(FINDINGS).map(|text| cut_to(text, WIDTH - INDENT)));
     rest(rows, findings.len(), FINDINGS, "finding")

@@ -788,7 +788,7 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
     for alternative in json["alternatives"].as_array().unwrap() {
         assert_keys(alternative, &["effects", "probability"], &[]);
     }
-    assert_keys(&json["unexplained"], &["fraction", "regimes"], &["learnable"]);
+    assert_keys(&json["unexplained"], &["fraction", "regimes"], &["learnable", "resembles"]);
     assert!((0.0..=1.0).contains(&json["unexplained"]["learnable"].as_f64().unwrap()));
     assert_keys(&json["shrink"], &["torque", "one_step", "rollout", "reference"], &[]);
     assert_change(&json["shrink"]["torque"], &[]);

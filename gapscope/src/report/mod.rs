@@ -39,8 +39,8 @@ pub use rest::sentence as sentence_of_the_rest;
 pub use rollout::page as rollout_page;
 pub use series::picture as series_picture;
 pub use words::{
-    capital, effect, implied_unit, interval, joints as joint_list, learnable, motion_unit, outstanding, parameter,
-    regime, regime_phrase, said_of, verdict,
+    capital, effect, implied_unit, interval, joints as joint_list, motion_unit, outstanding, parameter, regime,
+    regime_phrase, rest as words_of_the_rest, said_of, verdict,
 };
 
 /// Colours, type and layout; light and dark, wide, narrow and print.

@@ -38,7 +38,7 @@ pub fn sentence(diagnosis: &Diagnosis) -> String {
     let fraction = percent(left.fraction);
     format!(
         "{fraction} of the squared torque gap is left above the noise floor{when}{place}. {}",
-        words::learnable(left)
+        words::rest(left, &diagnosis.joints)
     )
 }
 

@@ -105,15 +105,36 @@ pub fn verdict_meaning(verdict: Verdict) -> &'static str {
     }
 }
 
-/// Of what is left, a network must predict this part to be worth a line.
+/// Of what is left, a resemblance or a network must account for this part to be worth a line.
 const LEARNED: f64 = 0.1;
 
-/// What a network still finds in what is left, in a sentence.
-pub fn learnable(left: &Unexplained) -> String {
+/// What is known of what is left, in a sentence: what it resembles, or else what a network finds in it.
+pub fn rest(left: &Unexplained, joint_names: &[String]) -> String {
+    if let Some(like) = left.resembles.as_ref().filter(|like| like.share > LEARNED) {
+        let laws: Vec<String> =
+            like.laws.iter().map(|l| format!("{} ({})", law(&l.law), joints(&l.joints, joint_names))).collect();
+        let share = percent(like.share);
+        return format!(
+            "What is left resembles {}: {share} of it; no effect of the catalogue does.",
+            laws.join(" and ")
+        );
+    }
     if left.learnable < LEARNED {
         return "A network finds next to nothing in what is left.".into();
     }
     format!("A network can still predict {} of what is left from the motion of the moment.", percent(left.learnable))
+}
+
+/// A law outside the catalogue in words.
+fn law(name: &str) -> &str {
+    match name {
+        "link_drag" => "drag of a medium on a link",
+        "joint_drag" => "drag that grows faster than the joint's speed",
+        "swing" => "a mass that swings on a link",
+        "rub" => "dry friction at some places of a joint's travel",
+        "catch" => "torque at some places of a joint's travel",
+        other => other,
+    }
 }
 
 /// Why the list of effects is empty.

@@ -135,7 +135,8 @@ pub fn partly() -> Case {
     diagnosis.effects.truncate(1);
     evidence.curves.retain(|c| c.kind == "coulomb_friction");
     diagnosis.shrink = shrink(0.2134, 0.0951);
-    diagnosis.unexplained = Unexplained { fraction: 0.284, learnable: 0.62, regimes: regimes(&joints()) };
+    diagnosis.unexplained =
+        Unexplained { fraction: 0.284, learnable: 0.62, resembles: None, regimes: regimes(&joints()) };
     diagnosis.alternatives.clear();
     ("partly", diagnosis, evidence)
 }
@@ -170,7 +171,7 @@ pub fn no_gap() -> Case {
     for h in &mut diagnosis.shrink.rollout {
         h.change = at_floor.clone();
     }
-    diagnosis.unexplained = Unexplained { fraction: 0.0, learnable: 0.0, regimes: vec![] };
+    diagnosis.unexplained = Unexplained { fraction: 0.0, learnable: 0.0, resembles: None, regimes: vec![] };
     diagnosis.data.findings.clear();
     ("no_gap", diagnosis, evidence)
 }
@@ -222,7 +223,7 @@ pub fn prismatic() -> Case {
     diagnosis.shrink.rollout.truncate(1);
     let map: BTreeMap<String, Estimate> = [("slide".to_string(), scalar(20.1, 0.4, "N"))].into();
     diagnosis.effects = vec![found("coulomb_friction", &names, 0.999, 0.9, &[("coulomb", Parameter::PerJoint(map))])];
-    diagnosis.unexplained = Unexplained { fraction: 0.0, learnable: 0.0, regimes: vec![] };
+    diagnosis.unexplained = Unexplained { fraction: 0.0, learnable: 0.0, resembles: None, regimes: vec![] };
     diagnosis.alternatives.clear();
     diagnosis.next_experiment = None;
     diagnosis.power = power(&names)[..1].to_vec();

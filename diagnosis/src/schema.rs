@@ -240,7 +240,7 @@ pub struct Unexplained {
     pub learnable: f64,
     /// What it is like, where laws that the catalogue does not have account for it; the laws are no effects, and the
     /// corrected model has none of them.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub resembles: Option<Resemblance>,
     /// Where it sits.
     pub regimes: Vec<Regime>,

@@ -10,9 +10,8 @@ fn named(effect: Effect) {
     let model = robot("arm6");
     let sensors = Sensors { position_noise: 1e-6, effort_noise: 0.01, ..Sensors::default() };
     let recipe = Recipe { sensors, ..Recipe::default() };
-    let logs: Vec<_> = (1..5)
-        .map(|seed| generate(&model, std::slice::from_ref(&effect), seed, &recipe, "log.csv").unwrap())
-        .collect();
+    let logs: Vec<_> =
+        (1..5).map(|seed| generate(&model, std::slice::from_ref(&effect), seed, &recipe, "log.csv").unwrap()).collect();
     let found = diagnose(&model, &logs).diagnosis.effects;
     assert_eq!(found.len(), 1, "{found:#?}");
     assert_eq!(found[0].kind, effect.kind().name(), "{found:#?}");

@@ -82,6 +82,7 @@ pub fn explained() -> Case {
         unexplained: Unexplained {
             fraction: 0.031,
             learnable: 0.04,
+            resembles: None,
             regimes: vec![regime(&names[3], "reversal", "speed", "rad/s", [Some(0.0), Some(0.05)], 0.41, 0.08)],
         },
         shrink: shrink(0.2134, 0.0151),
@@ -135,8 +136,11 @@ pub fn partly() -> Case {
     diagnosis.effects.truncate(1);
     evidence.curves.retain(|c| c.kind == "coulomb_friction");
     diagnosis.shrink = shrink(0.2134, 0.0951);
-    diagnosis.unexplained =
-        Unexplained { fraction: 0.284, learnable: 0.62, resembles: None, regimes: regimes(&joints()) };
+    let names = joints();
+    let law = |law: &str, joints: &[String]| Lookalike { law: law.into(), joints: joints.to_vec() };
+    let laws = vec![law("link_drag", &names[6..]), law("rub", &names[1..4])];
+    let resembles = Some(Resemblance { laws, share: 0.87 });
+    diagnosis.unexplained = Unexplained { fraction: 0.284, learnable: 0.62, resembles, regimes: regimes(&names) };
     diagnosis.alternatives.clear();
     ("partly", diagnosis, evidence)
 }

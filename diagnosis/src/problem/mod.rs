@@ -1,0 +1,315 @@
+//! The least-squares problem behind the choice of effects, kept as normal equations per block, so that any subset of
+//! candidates is fitted, held out and resampled in microseconds.
+
+mod solve;
+mod terms;
+mod weigh;
+
+use crate::band::Band;
+use crate::signals::Signals;
+use gapscope_dynamics::Model;
+use gapscope_effects::{Candidate, Column, EncoderSide, Kind};
+use rayon::prelude::*;
+use solve::Normal;
+pub use terms::{Entry, Term};
+pub use weigh::OF_NOISE;
+
+/// Rows of one joint: filtered columns and target.
+#[derive(Debug, Clone)]
+struct JointRows {
+    /// Columns of the problem that touch this joint.
+    columns: Vec<usize>,
+    /// Index into the band's rows.
+    rows: Vec<usize>,
+    /// Row-major values, `rows × columns`.
+    values: Vec<f64>,
+    target: Vec<f64>,
+    /// The target before any bending.
+    linear_target: Vec<f64>,
+    /// Robust weight of each row.
+    robust: Vec<f64>,
+}
+
+/// The problem: all candidates on all rows of a data set.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// Candidates and their columns. Column 0 is the alignment of effort and position and belongs to none.
+    pub entries: Vec<Entry>,
+    /// Least and greatest value of each coefficient.
+    pub bounds: Vec<(f64, f64)>,
+    /// Time between two samples of the fastest log, s.
+    pub sample: f64,
+    /// Typical effort of each joint, N m or N.
+    pub scale: Vec<f64>,
+    /// Noise floor of each joint, N m or N.
+    pub noise: Vec<f64>,
+    /// Standard deviation of what the weighing set does not explain, N m or N, with the immaterial part as its least value.
+    pub sigma: Vec<f64>,
+    /// Least root mean square torque by which an effect must move a joint to be named on its account, N m or N.
+    pub least: Vec<f64>,
+    /// Root mean square of what all effects together are to explain of each joint, N m or N.
+    pub gap: Vec<f64>,
+    /// Rows of each joint that count as one independent row.
+    correlation: Vec<f64>,
+    joints: Vec<JointRows>,
+    fold_of_block: Vec<usize>,
+    folds: usize,
+    blocks: Vec<Normal>,
+    training: Vec<Normal>,
+    /// Of the rows of each fold.
+    held: Vec<Normal>,
+    total: Normal,
+}
+
+impl Problem {
+    /// Sets up the problem: signatures of every candidate on every episode, filtered. `noise` is the noise floor of each
+    /// joint, N m or N. Before use it must be weighed.
+    pub fn new(
+        model: &Model,
+        signals: &[Signals],
+        band: &Band,
+        standstill: &[f64],
+        moving: &[bool],
+        terms: Vec<Term>,
+        noise: &[f64],
+    ) -> Problem {
+        let n = model.dof();
+        let terms: Vec<Term> = terms.into_iter().filter(|t| t.candidate.joints.iter().all(|&j| moving[j])).collect();
+        let sample = signals.iter().map(|s| s.raw.dt).fold(f64::INFINITY, f64::min);
+        let half_sample = 0.5 * sample;
+        let mut entries = Vec::new();
+        let mut bounds = vec![(-half_sample, half_sample)];
+        let mut joints: Vec<JointRows> = (0..n)
+            .map(|_| JointRows {
+                columns: vec![],
+                rows: vec![],
+                values: vec![],
+                target: vec![],
+                linear_target: vec![],
+                robust: vec![],
+            })
+            .collect();
+        for (e, s) in signals.iter().enumerate() {
+            let motion = s.motion(model, standstill);
+            let alignment = Column {
+                rows: (0..n).map(|j| (j, s.tau_rate[j].clone())).collect(),
+                at_least: -half_sample,
+                at_most: half_sample,
+            };
+            let columns: Vec<Vec<Column>> = terms.par_iter().map(|t| t.columns(&motion)).collect();
+            if e == 0 {
+                for (term, columns) in terms.iter().zip(&columns) {
+                    let begin = bounds.len();
+                    bounds.extend(columns.iter().map(|c| (c.at_least, c.at_most)));
+                    let tangent = term.tangent_at.is_some();
+                    let candidate = term.candidate.clone();
+                    entries.push(Entry { candidate, columns: begin..bounds.len(), rank: 0, tangent });
+                }
+                let all = std::iter::once(&alignment).chain(columns.iter().flatten());
+                for (index, column) in all.enumerate() {
+                    for (j, _) in &column.rows {
+                        joints[*j].columns.push(index);
+                    }
+                }
+            }
+            joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
+                if !moving[j] {
+                    return;
+                }
+                let counts: Vec<bool> = s.v[j].iter().map(|v| v.abs() >= standstill[j]).collect();
+                let residual: Vec<f64> =
+                    s.tau[j].iter().zip(&s.nominal[j]).map(|(tau, nominal)| tau - nominal).collect();
+                let target = band.filter_where(e, &counts, &residual);
+                let filtered: Vec<Vec<Option<f64>>> = std::iter::once(&alignment)
+                    .chain(columns.iter().flatten())
+                    .flat_map(|c| c.rows.iter().filter(|(row, _)| *row == j))
+                    .map(|(_, x)| band.filter_where(e, &counts, x))
+                    .collect();
+                for (i, row) in band.of_episode[e].clone().enumerate() {
+                    let Some(target) = target[i] else { continue };
+                    if !band.rows[row].fits {
+                        continue;
+                    }
+                    rows.rows.push(row);
+                    rows.linear_target.push(target);
+                    rows.target.push(target);
+                    rows.robust.push(1.0);
+                    rows.values.extend(filtered.iter().map(|x| x[i].unwrap_or(0.0)));
+                }
+            });
+        }
+        let scale = (0..n)
+            .map(|j| {
+                let (sum, count) = signals.iter().fold((0.0, 0usize), |(sum, count), s| {
+                    (sum + s.tau[j].iter().map(|t| t * t).sum::<f64>(), count + s.len())
+                });
+                (sum / count.max(1) as f64).sqrt().max(1e-9)
+            })
+            .collect();
+        let p = bounds.len();
+        let mut fold_of_block = vec![0; band.blocks];
+        for row in &band.rows {
+            fold_of_block[row.block] = row.fold;
+        }
+        Problem {
+            entries,
+            bounds,
+            sample,
+            scale,
+            noise: noise.to_vec(),
+            sigma: vec![1.0; n],
+            least: vec![0.0; n],
+            gap: joints.iter().map(JointRows::gap).collect(),
+            correlation: vec![1.0; n],
+            joints,
+            fold_of_block,
+            folds: band.folds,
+            blocks: Vec::new(),
+            training: Vec::new(),
+            held: Vec::new(),
+            total: Normal::zeros(p),
+        }
+    }
+
+    /// Adds to the target what effects that were found add to the residual beyond their linear signature
+    /// (`[episode][joint][signal]`, from the unbent problem), so that fitting again finds them exactly: a chord method.
+    pub fn bend(&mut self, signals: &[Signals], band: &Band, standstill: &[f64], curvature: &[Vec<Vec<f64>>]) {
+        self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
+            let mut bent = vec![0.0; band.rows.len()];
+            for (e, s) in signals.iter().enumerate() {
+                let counts: Vec<bool> = s.v[j].iter().map(|v| v.abs() >= standstill[j]).collect();
+                for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts, &curvature[e][j])) {
+                    bent[row] = x.unwrap_or(0.0);
+                }
+            }
+            for (i, &row) in rows.rows.iter().enumerate() {
+                rows.target[i] = rows.linear_target[i] + bent[row];
+            }
+        });
+        self.accumulate(band);
+    }
+
+    /// The same problem on some of the band's rows, with the same weights.
+    pub fn masked(&self, band: &Band, keep: impl Fn(usize) -> bool) -> Problem {
+        let mut part = self.clone();
+        for joint in &mut part.joints {
+            for (weight, &row) in joint.robust.iter_mut().zip(&joint.rows) {
+                if !keep(row) {
+                    *weight = 0.0;
+                }
+            }
+        }
+        part.accumulate(band);
+        part
+    }
+
+    /// Whether a robot could have an entry with these coefficients. A law that wants to be more than its bounds is some
+    /// other law (nothing at all, zero, it can be).
+    pub fn plausible(&self, c: usize, theta: &[f64]) -> bool {
+        let entry = &self.entries[c];
+        theta
+            .iter()
+            .zip(&self.bounds[entry.columns.clone()])
+            .all(|(&theta, &(low, high))| theta < high && (theta > low || low == 0.0))
+    }
+
+    /// Number of blocks that hold rows.
+    pub fn blocks_used(&self) -> usize {
+        self.blocks.iter().filter(|b| b.square > 0.0).count()
+    }
+
+    /// Columns of a set of candidates, the alignment first, unless an effect of the set says how late the effort acts.
+    pub fn columns(&self, set: &[usize]) -> Vec<usize> {
+        let late = |&c: &usize| matches!(self.entries[c].candidate.kind, Kind::ActuationDelay | Kind::ActuatorLag);
+        let alignment = (!set.iter().any(late)).then_some(0);
+        alignment.into_iter().chain(set.iter().flat_map(|&c| self.entries[c].columns.clone())).collect()
+    }
+
+    /// Side of the transmission that a set takes the log to show.
+    pub fn side(&self, set: &[usize]) -> EncoderSide {
+        let motor = set.iter().any(|&c| self.entries[c].candidate.side == EncoderSide::Motor);
+        if motor { EncoderSide::Motor } else { EncoderSide::Link }
+    }
+
+    /// Puts other candidates of the same kinds and joints in the places of some entries.
+    pub fn replace(
+        &mut self,
+        model: &Model,
+        signals: &[Signals],
+        band: &Band,
+        standstill: &[f64],
+        changes: &[(usize, Candidate)],
+    ) {
+        for (c, candidate) in changes {
+            let begin = self.entries[*c].columns.start;
+            let runs: Vec<Vec<Column>> =
+                signals.iter().map(|s| candidate.columns(&s.motion(model, standstill))).collect();
+            self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
+                let mut values: Vec<Vec<f64>> = vec![vec![0.0; band.rows.len()]; runs[0].len()];
+                let mut touched = false;
+                for (e, columns) in runs.iter().enumerate() {
+                    let counts: Vec<bool> = signals[e].v[j].iter().map(|v| v.abs() >= standstill[j]).collect();
+                    for (values, column) in values.iter_mut().zip(columns) {
+                        for (_, x) in column.rows.iter().filter(|(row, _)| *row == j) {
+                            touched = true;
+                            for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts, x)) {
+                                values[row] = x.unwrap_or(0.0);
+                            }
+                        }
+                    }
+                }
+                if touched {
+                    let m = rows.columns.len();
+                    for (i, values) in values.iter().enumerate() {
+                        let Some(at) = rows.columns.iter().position(|&column| column == begin + i) else { continue };
+                        for (r, &row) in rows.rows.iter().enumerate() {
+                            rows.values[r * m + at] = values[row];
+                        }
+                    }
+                }
+            });
+            for (i, column) in runs[0].iter().enumerate() {
+                self.bounds[begin + i] = (column.at_least, column.at_most);
+            }
+            self.entries[*c].candidate = candidate.clone();
+        }
+        self.accumulate(band);
+    }
+
+    /// Root mean square of what some columns add to each joint.
+    pub fn contribution(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {
+        self.joints
+            .iter()
+            .map(|rows| {
+                let sum: f64 = rows.predict(columns, theta).iter().map(|x| x * x).sum();
+                (sum / rows.rows.len().max(1) as f64).sqrt()
+            })
+            .collect()
+    }
+
+    /// What some columns add to one joint, row by row.
+    pub fn predict(&self, joint: usize, columns: &[usize], theta: &[f64]) -> Vec<f64> {
+        self.joints[joint].predict(columns, theta)
+    }
+}
+
+impl JointRows {
+    fn gap(&self) -> f64 {
+        let sum: f64 = self.linear_target.iter().map(|x| x * x).sum();
+        (sum / self.linear_target.len().max(1) as f64).sqrt()
+    }
+
+    fn predict(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {
+        let used: Vec<(usize, f64)> = columns
+            .iter()
+            .zip(theta)
+            .filter_map(|(c, &t)| self.columns.binary_search(c).ok().map(|at| (at, t)))
+            .collect();
+        let m = self.columns.len();
+        (0..self.rows.len()).map(|i| used.iter().map(|&(at, t)| self.values[i * m + at] * t).sum()).collect()
+    }
+
+    fn residual(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {
+        self.predict(columns, theta).iter().zip(&self.target).map(|(p, y)| y - p).collect()
+    }
+}

@@ -1,0 +1,174 @@
+//! What a row counts: by the size and correlation of what a fit leaves, and by how exact laws are.
+
+use super::Problem;
+use super::solve::Normal;
+use crate::band::Band;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Residuals beyond this many standard deviations get less weight (Huber 1964).
+const HUBER: f64 = 3.0;
+/// No law is exact to better than this part of the torque that it explains.
+const INEXACT: f64 = 0.003;
+/// Beyond this multiple of that, the weight falls with the square.
+const FAR: f64 = 2.0;
+/// Errors under this part of a joint's effort are nobody's concern: they are what sampling and integration leave.
+const IMMATERIAL: f64 = 1e-3;
+/// An effect must move some joint by this multiple of the immaterial part of its effort, ...
+const MATERIAL: f64 = 3.0;
+/// ... by this part of the noise, which many rows average out, and by all of what no candidate explains beyond the noise,
+/// which no number of rows averages out: with unknown effects of that size about, a smaller one cannot be named.
+pub const OF_NOISE: f64 = 0.2;
+/// Eigenvalues of a candidate's normal equations below this part of the largest count as zero.
+const RANK_TOLERANCE: f64 = 1e-6;
+
+impl Problem {
+    /// Weights from what a fit of some entries leaves: size and correlation of each joint's rest, outliers down-weighted.
+    ///
+    /// Not of all entries: laws that bend, many to a joint, together fit the noise too, and the scale would be rounding.
+    pub fn weigh(&mut self, band: &Band, set: &[usize]) {
+        self.sigma = self.scale.clone();
+        self.joints.iter_mut().for_each(|rows| rows.robust.fill(1.0));
+        self.accumulate(band);
+        for entry in &mut self.entries {
+            entry.rank = rank(&self.total.gram, &entry.columns);
+        }
+        let columns = self.columns(set);
+        for _ in 0..5 {
+            let theta = self.solve_unbounded(&columns, &self.total);
+            for (j, rows) in self.joints.iter_mut().enumerate() {
+                let rest = rows.residual(&columns, &theta);
+                if rest.len() < 8 {
+                    continue;
+                }
+                let mut size: Vec<f64> = rest.iter().map(|r| r.abs()).collect();
+                let middle = size.len() / 2;
+                let spread = 1.4826 * *size.select_nth_unstable_by(middle, f64::total_cmp).1;
+                let least = IMMATERIAL * self.scale[j];
+                for (weight, r) in rows.robust.iter_mut().zip(&rest) {
+                    let z = r.abs() / (HUBER * spread.max(least));
+                    // Huber near, and far out as if the row were not there.
+                    *weight = if z > FAR {
+                        FAR / (z * z)
+                    } else if z > 1.0 {
+                        1.0 / z
+                    } else {
+                        1.0
+                    };
+                }
+                let clipped: Vec<f64> = rest.iter().zip(&rows.robust).map(|(r, w)| r * w).collect();
+                let used = rows.columns.iter().filter(|c| columns.contains(c)).count();
+                let free = rows.rows.len().saturating_sub(used).max(1);
+                self.sigma[j] = (clipped.iter().map(|r| r * r).sum::<f64>() / free as f64).sqrt().max(least);
+                self.correlation[j] = correlation_time(&clipped);
+            }
+            self.accumulate(band);
+        }
+        self.allow_for_inexact_laws();
+        self.least = (0..self.joints.len())
+            .map(|j| {
+                let misfit = (self.sigma[j].powi(2) - self.noise[j].powi(2)).max(0.0).sqrt();
+                (OF_NOISE * self.noise[j]).max(misfit).max(MATERIAL * IMMATERIAL * self.scale[j])
+            })
+            .collect();
+        self.accumulate(band);
+    }
+
+    fn allow_for_inexact_laws(&mut self) {
+        for (rows, sigma) in self.joints.iter_mut().zip(&self.sigma) {
+            for (weight, target) in rows.robust.iter_mut().zip(&rows.linear_target) {
+                *weight /= 1.0 + (INEXACT * target / sigma).powi(2);
+            }
+        }
+    }
+
+    /// Weighs rows that are not measured yet as another problem of the same robot weighs its own.
+    pub fn weigh_like(&mut self, other: &Problem, band: &Band) {
+        (self.sigma, self.correlation) = (other.sigma.clone(), other.correlation.clone());
+        self.allow_for_inexact_laws();
+        self.accumulate(band);
+    }
+
+    /// Normal equations of every block. Rows are weighted, not whitened: whitening would rest the fit on the fast edges of
+    /// the signals, where simple laws (a friction step) are least true.
+    pub(super) fn accumulate(&mut self, band: &Band) {
+        let p = self.bounds.len();
+        let joints = &self.joints;
+        let (sigma, correlation) = (&self.sigma, &self.correlation);
+        let blocks: Vec<Normal> = (0..band.blocks)
+            .into_par_iter()
+            .map(|block| {
+                let mut normal = Normal::zeros(p);
+                for (j, rows) in joints.iter().enumerate() {
+                    let scale = 1.0 / (sigma[j] * sigma[j] * correlation[j]);
+                    let m = rows.columns.len();
+                    let mine: Vec<usize> =
+                        (0..rows.rows.len()).filter(|&i| band.rows[rows.rows[i]].block == block).collect();
+                    if mine.is_empty() {
+                        continue;
+                    }
+                    let weight: Vec<f64> = mine.iter().map(|&i| (rows.robust[i] * scale).sqrt()).collect();
+                    let x = DMatrix::from_fn(mine.len(), m, |r, c| weight[r] * rows.values[mine[r] * m + c]);
+                    let y = DVector::from_fn(mine.len(), |r, _| weight[r] * rows.target[mine[r]]);
+                    normal.square += y.norm_squared();
+                    let (gram, moment) = (x.tr_mul(&x), x.tr_mul(&y));
+                    for (a, &ca) in rows.columns.iter().enumerate() {
+                        normal.moment[ca] += moment[a];
+                        for (b, &cb) in rows.columns.iter().enumerate() {
+                            normal.gram[(cb, ca)] += gram[(b, a)];
+                        }
+                    }
+                }
+                normal
+            })
+            .collect();
+        let mut total = Normal::zeros(p);
+        for normal in &blocks {
+            total.add(normal);
+        }
+        let fold_of_block = &self.fold_of_block;
+        let sum = |keep: &(dyn Fn(usize) -> bool + Sync)| {
+            let mut sum = Normal::zeros(p);
+            blocks.iter().zip(fold_of_block).filter(|(_, of)| keep(**of)).for_each(|(normal, _)| sum.add(normal));
+            sum
+        };
+        self.training = (0..self.folds).into_par_iter().map(|fold| sum(&|of| of != fold)).collect();
+        self.held = (0..self.folds).into_par_iter().map(|fold| sum(&|of| of == fold)).collect();
+        self.blocks = blocks;
+        self.total = total;
+    }
+
+    /// Rows that count as independent, all joints together; two at least.
+    pub fn effective_rows(&self) -> f64 {
+        self.joints.iter().zip(&self.correlation).map(|(j, c)| j.rows.len() as f64 / c).sum::<f64>().max(2.0)
+    }
+}
+
+/// Directions of a candidate's coefficients along which the torque moves, from its part of the normal equations.
+fn rank(gram: &DMatrix<f64>, columns: &Range<usize>) -> usize {
+    let size: Vec<f64> = columns.clone().map(|c| gram[(c, c)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(size.len(), size.len(), |i, j| {
+        let product = size[i] * size[j];
+        if product > 0.0 { gram[(columns.start + i, columns.start + j)] / product } else { 0.0 }
+    });
+    let values = scaled.symmetric_eigenvalues();
+    values.iter().filter(|v| **v > RANK_TOLERANCE * values.max()).count().max(1)
+}
+
+/// Rows per independent row: 1 + 2 Σ ρ_k over the first lags whose autocorrelation ρ_k is positive.
+fn correlation_time(x: &[f64]) -> f64 {
+    let power: f64 = x.iter().map(|v| v * v).sum();
+    if power <= 0.0 {
+        return 1.0;
+    }
+    let mut time = 1.0;
+    for lag in 1..x.len().min(100) {
+        let rho = x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum::<f64>() / power;
+        if rho < 0.05 {
+            break;
+        }
+        time += 2.0 * rho;
+    }
+    time
+}

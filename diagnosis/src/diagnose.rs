@@ -51,10 +51,12 @@ const MISFIT: i32 = 4;
 /// Effects that are there, of those named beside a rest so large that nothing speaks for them, and of those named beyond
 /// doubt, measured on withheld cases: laws that nobody has thought of look like those in the catalogue at times.
 const THERE: (f64, f64) = (0.38, 0.97);
+/// The first of these for a spring or play and its rotor: what sways in time resembles a resonance more than any other law.
+const A_DRIVE_THERE: f64 = 0.1;
 
 /// The part of effects with such an evidence that are there.
-fn calibrated(evidence: f64) -> f64 {
-    THERE.0 + (THERE.1 - THERE.0) * evidence
+fn calibrated(evidence: f64, least: f64) -> f64 {
+    least + (THERE.1 - least) * evidence
 }
 
 /// Everything a diagnosis gives.
@@ -452,13 +454,15 @@ impl Logs<'_> {
             if late.is_some_and(|doubt| doubt > INDISTINGUISHABLE) {
                 confused.extend(select::LATE.iter().filter(|other| **other != kind).map(|k| k.name().to_owned()));
             }
+            let of_a_drive = own.iter().any(|&c| problem.entries[c].candidate.turns());
+            let least = if of_a_drive { A_DRIVE_THERE } else { THERE.0 };
             let loss = rival.map_or(0.0, |r| r.choice.blocks.iter().sum::<f64>());
             found.push((
                 loss,
                 FoundEffect {
                     kind: kind.name().to_owned(),
                     joints: effect.law().joints(),
-                    confidence: calibrated((1.0 - doubt) * (1.0 - misfit).powi(MISFIT)),
+                    confidence: calibrated((1.0 - doubt) * (1.0 - misfit).powi(MISFIT), least),
                     parameters: fit.parameters(problem, self.model, kind, &own),
                     indistinguishable_from: confused,
                     shrink: EffectShrink { torque: shrink },

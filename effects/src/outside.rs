@@ -89,7 +89,7 @@ pub(crate) fn catch(motion: &Motion, joint: usize, place: f64) -> Vec<Column> {
     vec![Column::on(joint, torque, f64::NEG_INFINITY)]
 }
 
-/// Places along a joint's travel, rad (m); none where it has no extent.
+/// Places along a joint's travel, rad (m); its least position alone where it has no finite extent.
 pub(crate) fn places(range: &Range) -> impl Iterator<Item = f64> {
     let count = if range.span.is_finite() { (range.span / PLACE).ceil().min(200.0) as usize } else { 0 };
     let first = range.least;

@@ -239,8 +239,13 @@ impl Logs<'_> {
     /// Held-out residuals of a set less what laws outside the catalogue in it account for.
     pub(crate) fn beside_outside(&self, problem: &Problem, set: &[usize], rows: &Rows) -> Rows {
         let mut rows = rows.clone();
+        let outside: Vec<usize> =
+            set.iter().copied().filter(|&c| problem.entries[c].candidate.kind.is_outside()).collect();
+        if outside.is_empty() {
+            return rows;
+        }
         let fits: Vec<Fit> = (0..self.band.folds).map(|fold| Fit::without_fold(problem, set, fold)).collect();
-        for &c in set.iter().filter(|&&c| problem.entries[c].candidate.kind.is_outside()) {
+        for c in outside {
             let theta: Vec<Vec<f64>> = fits.iter().map(|fit| fit.own(problem, c).1).collect();
             for (e, s) in self.signals.iter().enumerate() {
                 let columns = problem.entries[c].candidate.columns(&s.motion(self.model, &self.still));

@@ -18,22 +18,7 @@ const SWING_DAMPING: f64 = 0.05;
 /// Drag of a medium on a link, Jᵀ c |ẋ| ẋ at its centre of mass. Coefficient: c, N s²/m².
 /// Source: White, Fluid Mechanics (7th ed., 2011), section 7.6.
 pub(crate) fn link_drag(motion: &Motion, link: usize) -> Vec<Column> {
-    let n = motion.model.dof();
-    let mut data = Data::new(motion.model);
-    let mut jacobian = DMatrix::zeros(6, n);
-    let center = motion.model.joints()[link].inertia.center_of_mass().unwrap_or_default();
-    let mut q = vec![0.0; n];
-    let mut rows: Vec<(usize, Vec<f64>)> = (0..n).map(|j| (j, vec![0.0; motion.len()])).collect();
-    for k in 0..motion.len() {
-        (0..n).for_each(|j| q[j] = motion.q[j][k]);
-        motion.model.jacobian(&mut data, &q, link, center, &mut jacobian);
-        let velocity: [f64; 3] = std::array::from_fn(|i| (0..n).map(|j| jacobian[(i, j)] * motion.v[j][k]).sum());
-        let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
-        for (j, row) in &mut rows {
-            row[k] = speed * (0..3).map(|i| jacobian[(i, *j)] * velocity[i]).sum::<f64>();
-        }
-    }
-    vec![Column { rows, at_least: 0.0, at_most: f64::INFINITY }]
+    pulled(motion, link, |velocity| velocity.length() * velocity)
 }
 
 /// A mass that swings on the last link of a chain: a liquid, a load on a rope. The link carries it without its weight; what it
@@ -41,30 +26,36 @@ pub(crate) fn link_drag(motion: &Motion, link: usize) -> Vec<Column> {
 /// link's centre of mass and s the mass. Coefficient: m, kg.
 /// Source: Ibrahim, Liquid Sloshing Dynamics (2005), section 5.2 (equivalent mechanical models).
 pub(crate) fn swing(motion: &Motion, link: usize, frequency: f64) -> Vec<Column> {
+    let (omega, h) = (TAU * frequency, motion.dt);
+    let (spring, damper) = (omega * omega, 2.0 * SWING_DAMPING * omega);
+    // p − s and its rate, from rest; by the trapezoidal rule, which neither damps nor drives.
+    let (mut apart, mut rate) = (DVec3::ZERO, DVec3::ZERO);
+    let mut before: Option<DVec3> = None;
+    pulled(motion, link, |velocity| {
+        let gained = velocity - before.unwrap_or(velocity);
+        before = Some(velocity);
+        let pull = spring * apart + damper * rate;
+        // (1 + h d/2 + h² s/4) Δṙ = Δṗ − h (pull + h s ṙ/2)
+        let change = (gained - h * (pull + 0.5 * h * spring * rate)) / (1.0 + 0.5 * h * damper + 0.25 * h * h * spring);
+        apart += h * (rate + 0.5 * change);
+        rate += change;
+        spring * apart + damper * rate
+    })
+}
+
+/// Jᵀ F of a force on a link's centre of mass, from that point's velocity, m/s, sample by sample.
+fn pulled(motion: &Motion, link: usize, mut force: impl FnMut(DVec3) -> DVec3) -> Vec<Column> {
     let n = motion.model.dof();
     let mut data = Data::new(motion.model);
     let mut jacobian = DMatrix::zeros(6, n);
     let center = motion.model.joints()[link].inertia.center_of_mass().unwrap_or_default();
     let mut q = vec![0.0; n];
     let mut rows: Vec<(usize, Vec<f64>)> = (0..n).map(|j| (j, vec![0.0; motion.len()])).collect();
-    let (omega, h) = (TAU * frequency, motion.dt);
-    let (spring, damper) = (omega * omega, 2.0 * SWING_DAMPING * omega);
-    // p − s and its rate, from rest; by the trapezoidal rule, which neither damps nor drives.
-    let (mut apart, mut rate) = (DVec3::ZERO, DVec3::ZERO);
-    let mut velocity: Option<DVec3> = None;
     for k in 0..motion.len() {
         (0..n).for_each(|j| q[j] = motion.q[j][k]);
         motion.model.jacobian(&mut data, &q, link, center, &mut jacobian);
         let along = |i: usize| (0..n).map(|j| jacobian[(i, j)] * motion.v[j][k]).sum::<f64>();
-        let now = DVec3::new(along(0), along(1), along(2));
-        let gained = velocity.map_or(DVec3::ZERO, |before| now - before);
-        velocity = Some(now);
-        let pull = spring * apart + damper * rate;
-        // (1 + h d/2 + h² s/4) Δṙ = Δṗ − h (pull + h s ṙ/2)
-        let change = (gained - h * (pull + 0.5 * h * spring * rate)) / (1.0 + 0.5 * h * damper + 0.25 * h * h * spring);
-        apart += h * (rate + 0.5 * change);
-        rate += change;
-        let force = spring * apart + damper * rate;
+        let force = force(DVec3::new(along(0), along(1), along(2)));
         for (j, row) in &mut rows {
             row[k] = (0..3).map(|i| jacobian[(i, *j)] * force[i]).sum();
         }

@@ -199,26 +199,29 @@ impl Logs<'_> {
 
     /// Residuals and state errors on each fold of the model fitted without that fold.
     pub(crate) fn held_out(&self, problem: &Problem, set: &[usize], with_errors: bool) -> Result<HeldOut, EffectError> {
-        let fits: Vec<Fit> = (0..self.band.folds).map(|fold| Fit::without_fold(problem, set, fold)).collect();
+        let fits = Fit::without_folds(problem, set);
         let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
         let side = problem.side(set);
         let n = self.model.dof();
-        let mut rows: Rows = vec![vec![0.0; self.band.rows.len()]; n];
-        for (e, s) in self.signals.iter().enumerate() {
-            let range = self.band.of_episode[e].clone();
-            for fold in 0..self.band.folds {
-                if !self.band.rows[range.clone()].iter().any(|r| r.fold == fold) {
-                    continue;
-                }
+        let in_fold = |i: usize, fold: usize| self.band.rows[i].fold == fold;
+        let runs: Vec<(usize, usize)> = (0..self.signals.len())
+            .flat_map(|e| (0..self.band.folds).map(move |fold| (e, fold)))
+            .filter(|&(e, fold)| self.band.of_episode[e].clone().any(|i| in_fold(i, fold)))
+            .collect();
+        let filtered: Vec<Vec<Vec<f64>>> = runs
+            .par_iter()
+            .map(|&(e, fold)| {
+                let s = &self.signals[e];
                 let mut plant = plant_pushed(self.model, &effects[fold], side, s.dt, &s.pushed)?;
                 let rest = residual(&mut plant, self.model, s, &self.still, fits[fold].alignment());
-                for (row, x) in rows.iter_mut().zip(&rest) {
-                    let filtered = self.band.filter(e, x);
-                    for (i, value) in range.clone().zip(filtered) {
-                        if self.band.rows[i].fold == fold {
-                            row[i] = value;
-                        }
-                    }
+                Ok(rest.iter().map(|x| self.band.filter(e, x)).collect())
+            })
+            .collect::<Result<_, EffectError>>()?;
+        let mut rows: Rows = vec![vec![0.0; self.band.rows.len()]; n];
+        for (&(e, fold), filtered) in runs.iter().zip(&filtered) {
+            for (row, filtered) in rows.iter_mut().zip(filtered) {
+                for (i, value) in self.band.of_episode[e].clone().zip(filtered).filter(|(i, _)| in_fold(*i, fold)) {
+                    row[i] = *value;
                 }
             }
         }
@@ -244,7 +247,7 @@ impl Logs<'_> {
         if outside.is_empty() {
             return rows;
         }
-        let fits: Vec<Fit> = (0..self.band.folds).map(|fold| Fit::without_fold(problem, set, fold)).collect();
+        let fits = Fit::without_folds(problem, set);
         for c in outside {
             let theta: Vec<Vec<f64>> = fits.iter().map(|fit| fit.own(problem, c).1).collect();
             for (e, s) in self.signals.iter().enumerate() {
@@ -320,7 +323,7 @@ impl Logs<'_> {
         let after = self.held_out(problem, &fit.set, true)?;
         let final_residuals: Vec<Vec<Vec<f64>>> = self
             .signals
-            .iter()
+            .par_iter()
             .map(|s| {
                 Ok(residual(
                     &mut plant_pushed(model, &effects, side, s.dt, &s.pushed)?,

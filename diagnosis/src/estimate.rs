@@ -36,11 +36,11 @@ impl Fit {
         Fit { set: set.to_vec(), columns, theta }
     }
 
-    /// Fit on all rows outside a fold.
-    pub fn without_fold(problem: &Problem, set: &[usize], fold: usize) -> Fit {
+    /// Fits on all rows outside each fold.
+    pub fn without_folds(problem: &Problem, set: &[usize]) -> Vec<Fit> {
         let columns = problem.columns(set);
-        let theta = problem.fit_without(&columns, fold);
-        Fit { set: set.to_vec(), columns, theta }
+        let fit = |theta| Fit { set: set.to_vec(), columns: columns.clone(), theta };
+        problem.fits_without(&columns).into_iter().map(fit).collect()
     }
 
     /// Time by which the logged effort acts late against the position, s.

@@ -45,15 +45,18 @@ impl Problem {
         self.solve(columns, &self.total)
     }
 
-    /// Coefficients of the columns on all rows outside a fold.
-    pub fn fit_without(&self, columns: &[usize], fold: usize) -> Vec<f64> {
-        self.solve(columns, &self.training[fold])
+    /// Coefficients of the columns on all rows outside each fold.
+    pub fn fits_without(&self, columns: &[usize]) -> Vec<Vec<f64>> {
+        // What bounds hold on all rows they mostly hold on part of them: most of the way is gone once.
+        let mut held = vec![None; columns.len()];
+        self.descend(columns, &self.total, &mut held);
+        self.training.iter().map(|training| self.descend(columns, training, &mut held.clone())).collect()
     }
 
     /// Held-out deviance of each block.
     pub fn held_out(&self, set: &[usize]) -> Vec<f64> {
         let columns = self.columns(set);
-        let fits: Vec<Vec<f64>> = (0..self.folds).map(|fold| self.fit_without(&columns, fold)).collect();
+        let fits = self.fits_without(&columns);
         self.blocks
             .iter()
             .zip(&self.fold_of_block)
@@ -64,7 +67,7 @@ impl Problem {
     /// Held-out deviance of all blocks together.
     pub fn held_out_total(&self, set: &[usize]) -> f64 {
         let columns = self.columns(set);
-        (0..self.folds).map(|fold| self.held[fold].deviance(&columns, &self.fit_without(&columns, fold))).sum()
+        self.held.iter().zip(self.fits_without(&columns)).map(|(held, fit)| held.deviance(&columns, &fit)).sum()
     }
 
     /// Covariance of the coefficients by the sandwich over blocks, which allows for any correlation inside a block.
@@ -141,12 +144,17 @@ impl Problem {
             .collect()
     }
 
-    /// Bounded least squares by an active set: coefficients beyond a bound are held there while that lowers the deviance.
+    /// Bounded least squares.
     fn solve(&self, columns: &[usize], normal: &Normal) -> Vec<f64> {
+        self.descend(columns, normal, &mut vec![None; columns.len()])
+    }
+
+    /// Bounded least squares by an active set: coefficients beyond a bound are `held` there while that lowers the deviance.
+    /// Those held at first are a guess; the least deviance is the same from any.
+    fn descend(&self, columns: &[usize], normal: &Normal, held: &mut [Option<f64>]) -> Vec<f64> {
         let m = columns.len();
         let gram = self.regular(columns, normal);
         let moment = DVector::from_fn(m, |i, _| normal.moment[columns[i]]);
-        let mut held: Vec<Option<f64>> = vec![None; m];
         let mut theta = vec![0.0; m];
         for _ in 0..3 * m + 3 {
             let free: Vec<usize> = (0..m).filter(|&i| held[i].is_none()).collect();

@@ -109,10 +109,10 @@ impl Problem {
                         continue;
                     }
                     let weight: Vec<f64> = mine.iter().map(|&i| (rows.robust[i] * scale).sqrt()).collect();
-                    let x = DMatrix::from_fn(mine.len(), m, |r, c| weight[r] * rows.values[mine[r] * m + c]);
+                    let x = DMatrix::from_fn(m, mine.len(), |c, r| weight[r] * rows.values[mine[r] * m + c]);
                     let y = DVector::from_fn(mine.len(), |r, _| weight[r] * rows.target[mine[r]]);
                     normal.square += y.norm_squared();
-                    let (gram, moment) = (x.tr_mul(&x), x.tr_mul(&y));
+                    let (gram, moment) = (&x * x.transpose(), &x * &y);
                     for (a, &ca) in rows.columns.iter().enumerate() {
                         normal.moment[ca] += moment[a];
                         for (b, &cb) in rows.columns.iter().enumerate() {
@@ -123,20 +123,23 @@ impl Problem {
                 normal
             })
             .collect();
-        let mut total = Normal::zeros(p);
-        for normal in &blocks {
-            total.add(normal);
+        self.held = vec![Normal::zeros(p); self.folds];
+        for (normal, &fold) in blocks.iter().zip(&self.fold_of_block) {
+            self.held[fold].add(normal);
         }
-        let fold_of_block = &self.fold_of_block;
-        let sum = |keep: &(dyn Fn(usize) -> bool + Sync)| {
-            let mut sum = Normal::zeros(p);
-            blocks.iter().zip(fold_of_block).filter(|(_, of)| keep(**of)).for_each(|(normal, _)| sum.add(normal));
-            sum
-        };
-        self.training = (0..self.folds).into_par_iter().map(|fold| sum(&|of| of != fold)).collect();
-        self.held = (0..self.folds).into_par_iter().map(|fold| sum(&|of| of == fold)).collect();
+        // All but one fold: those before and those after. Taken from the total, a column that one fold alone has would leave
+        // its rounding errors for a signal.
+        self.training = vec![Normal::zeros(p); self.folds];
+        let (mut before, mut after) = (Normal::zeros(p), Normal::zeros(p));
+        for fold in 0..self.folds {
+            self.training[fold].add(&before);
+            before.add(&self.held[fold]);
+            let last = self.folds - 1 - fold;
+            self.training[last].add(&after);
+            after.add(&self.held[last]);
+        }
+        self.total = before;
         self.blocks = blocks;
-        self.total = total;
     }
 
     /// Rows that count as independent, all joints together; two at least.

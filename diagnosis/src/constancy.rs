@@ -1,16 +1,25 @@
 //! Whether an effect is the same in every regime. A law holds slow and fast, here and there, early and late; what stands in
 //! for a law that the catalogue does not have holds only on average, and falls apart when it is fitted to the slowest
-//! and the fastest third of the rows, the first and the last, either end of the range.
+//! and the fastest third of the rows, the first and the last, either end of the range, or to what changes slowly and what
+//! changes fast. The last tells what the robot does from what is done to it: a joint that something outside shakes
+//! accelerates in step with the shaking, and looks heavier or lighter at that frequency alone.
 
 use crate::band::Band;
 use crate::estimate::Fit;
 use crate::problem::Problem;
 use crate::signals::Signals;
 use gapscope_effects::{Candidate, Kind};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Two thirds disagree where their torques differ by this part of the greater.
 const APART: f64 = 0.35;
+/// Times over which rows are averaged to part slow from fast, s.
+const SLOW: [f64; 2] = [0.5, 0.2];
+/// Slow and fast fits disagree where they lie so many standard errors apart, too: each holds little of some laws, ...
+const BEYOND_NOISE: f64 = 3.0;
+/// ... and where either holds less than this part of a law's torque it is not asked.
+const SHOWS: f64 = 0.1;
 /// Kinds that no third can be asked about: they act at times of their own.
 const OF_THE_MOMENT: [Kind; 3] = [Kind::ExternalContact, Kind::ThermalDrift, Kind::TorqueSaturation];
 
@@ -21,6 +30,21 @@ pub fn inconsistent(problem: &Problem, fit: &Fit, signals: &[Signals], band: &Ba
         .map(|(joint, third)| {
             let part = |part: usize| Fit::on_all(&problem.masked(band, |row| third[row] == part), &fit.set);
             (joint, [part(0), part(2)])
+        })
+        .collect();
+    let spacing = band.rows.windows(2).find(|rows| rows[0].episode == rows[1].episode).map_or(0.0, |rows| {
+        let s = &signals[rows[0].episode];
+        (rows[1].center - rows[0].center) as f64 * s.dt
+    });
+    let parts: Vec<[(Problem, Fit); 2]> = SLOW
+        .into_par_iter()
+        .filter(|_| spacing > 0.0)
+        .map(|slow| {
+            let reach = (0.5 * slow / spacing).round().max(1.0) as usize;
+            problem.slow_and_fast(band, reach).map(|part| {
+                let fit = Fit::on_all(&part, &fit.set);
+                (part, fit)
+            })
         })
         .collect();
     let mut found: Vec<(usize, f64)> = fit
@@ -34,8 +58,17 @@ pub fn inconsistent(problem: &Problem, fit: &Fit, signals: &[Signals], band: &Ba
                 .filter(|(joint, _)| {
                     asked(joint) && !OF_THE_MOMENT.contains(&candidate.kind) && !candidate.kind.is_outside()
                 })
-                .map(|(_, thirds)| apart(problem, c, thirds))
+                .map(|(_, thirds)| apart(problem, c, [&thirds[0], &thirds[1]]))
                 .fold(0.0, f64::max);
+            let apart = parts
+                .iter()
+                .filter(|parts| {
+                    let holds = |(part, _): &(Problem, Fit)| size(part, fit, c) > SHOWS * size(problem, fit, c);
+                    let asked = !OF_THE_MOMENT.contains(&candidate.kind) && !candidate.kind.is_outside();
+                    asked && parts.iter().all(holds) && beyond_noise(c, parts)
+                })
+                .map(|[(_, slow), (_, fast)]| self::apart(problem, c, [slow, fast]))
+                .fold(apart, f64::max);
             (apart > APART).then_some((c, apart))
         })
         .collect();
@@ -68,14 +101,34 @@ fn splits(problem: &Problem, fit: &Fit, signals: &[Signals], band: &Band) -> Vec
     splits
 }
 
-/// Part of an entry's torque by which two thirds differ.
-fn apart(problem: &Problem, entry: usize, thirds: &[Fit; 2]) -> f64 {
-    let own: Vec<Vec<f64>> = thirds.iter().map(|third| third.own(problem, entry).1).collect();
+/// Size of an entry's torque by a fit, on the rows of a problem.
+fn size(problem: &Problem, fit: &Fit, entry: usize) -> f64 {
+    let columns: Vec<usize> = problem.entries[entry].columns.clone().collect();
+    let (_, theta) = fit.own(problem, entry);
+    problem.contribution(&columns, &theta).iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Part of an entry's torque by which two fits differ.
+fn apart(problem: &Problem, entry: usize, fits: [&Fit; 2]) -> f64 {
+    let own: Vec<Vec<f64>> = fits.iter().map(|fit| fit.own(problem, entry).1).collect();
     let difference: Vec<f64> = own[0].iter().zip(&own[1]).map(|(a, b)| a - b).collect();
     let columns: Vec<usize> = problem.entries[entry].columns.clone().collect();
     let size = |theta: &[f64]| problem.contribution(&columns, theta).iter().map(|x| x * x).sum::<f64>().sqrt();
     let greater = size(&own[0]).max(size(&own[1]));
     if greater > 0.0 { size(&difference) / greater } else { 0.0 }
+}
+
+/// Whether an entry's coefficients on two parts differ by more than their standard errors say.
+fn beyond_noise(entry: usize, parts: &[(Problem, Fit); 2]) -> bool {
+    let own = parts.each_ref().map(|(part, fit)| {
+        let (at, theta) = fit.own(part, entry);
+        let covariance = part.covariance(&fit.columns, &fit.theta);
+        (theta, DMatrix::from_fn(at.len(), at.len(), |i, j| covariance[(at[i], at[j])]))
+    });
+    let [(a, of_a), (b, of_b)] = own;
+    let difference = DVector::from_iterator(a.len(), a.iter().zip(&b).map(|(a, b)| a - b));
+    let square = (of_a + of_b).cholesky().map_or(0.0, |errors| difference.dot(&errors.solve(&difference)));
+    square > BEYOND_NOISE * BEYOND_NOISE * a.len() as f64
 }
 
 #[cfg(test)]
@@ -87,15 +140,14 @@ mod tests {
     use gapscope_datasets::{Recipe, generate};
     use gapscope_dynamics::robots;
 
-    /// What falls apart of viscous friction fitted to a drag on the first joint of a double pendulum.
-    fn fitted_as_viscous(drag: impl Fn(f64) -> f64) -> Vec<(usize, f64)> {
+    /// What falls apart of a kind fitted to the first joint of a double pendulum, of logs to which something is done.
+    fn fitted_as(kind: Kind, done: impl Fn(&mut Signals)) -> Vec<(usize, f64)> {
         let model = robots::model("double_pendulum").unwrap().unwrap().model;
         let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
         let signals: Vec<Signals> = (1..4)
             .map(|seed| {
                 let mut s = Signals::new(&model, &generate(&model, &[], seed, &recipe, "log").unwrap()).unwrap();
-                let (tau, v) = (&mut s.tau[0], &s.v[0]);
-                tau.iter_mut().zip(v).for_each(|(tau, v)| *tau += drag(*v));
+                done(&mut s);
                 s
             })
             .collect();
@@ -108,15 +160,41 @@ mod tests {
             moving: &[true; 2],
             noise: &[1e-3; 2],
         };
-        let term = Term { candidate: Candidate::new(Kind::ViscousFriction, vec![0]), tangent_at: None };
+        let term = Term { candidate: Candidate::new(kind, vec![0]), tangent_at: None };
         let problem = data.problem(vec![term], &Kind::ALL);
         inconsistent(&problem, &Fit::on_all(&problem, &[0]), &signals, &band)
     }
 
+    /// Torque on the first joint, from its velocity.
+    fn torque(law: fn(f64) -> f64) -> impl Fn(&mut Signals) {
+        move |s| s.tau[0].iter_mut().zip(&s.v[0]).for_each(|(tau, v)| *tau += law(*v))
+    }
+
     #[test]
     fn a_law_holds_in_every_regime_and_its_substitute_does_not() {
-        assert_eq!(fitted_as_viscous(|v| 0.5 * v), []);
-        let apart = fitted_as_viscous(|v| 0.5 * v * v.abs());
+        assert_eq!(fitted_as(Kind::ViscousFriction, torque(|v| 0.5 * v)), []);
+        let apart = fitted_as(Kind::ViscousFriction, torque(|v| 0.5 * v * v.abs()));
         assert!(apart.len() == 1 && apart[0].1 > 0.5, "{apart:?}");
+    }
+
+    /// Something shakes the joint: effort and acceleration go together, at any speed, anywhere and at any time, but at the
+    /// frequency of the shaking alone.
+    #[test]
+    fn a_law_holds_in_slow_changes_and_in_fast_ones() {
+        let shaken = |everything: f64| {
+            move |s: &mut Signals| {
+                let size = (s.a[0].iter().map(|a| a * a).sum::<f64>() / s.len() as f64).sqrt();
+                for k in 0..s.len() {
+                    let shake = 4.0 * size * (std::f64::consts::TAU * 4.0 * k as f64 * s.dt).sin();
+                    s.tau[0][k] += 0.02 * (shake + everything * s.a[0][k]);
+                    s.a[0][k] += shake;
+                }
+            }
+        };
+        assert_eq!(fitted_as(Kind::Armature, shaken(1.0)), []);
+        let apart = fitted_as(Kind::Armature, shaken(0.0));
+        assert!(apart.len() == 1 && apart[0].1 > 0.5, "{apart:?}");
+        // A constant has nothing that is fast.
+        assert_eq!(fitted_as(Kind::TorqueBias, torque(|_| 0.5)), []);
     }
 }

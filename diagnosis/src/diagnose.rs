@@ -50,13 +50,11 @@ const MISFIT: i32 = 4;
 
 /// Effects that are there, of those named beside a rest so large that nothing speaks for them, and of those named beyond
 /// doubt, measured on withheld cases: laws that nobody has thought of look like those in the catalogue at times.
-const THERE: (f64, f64) = (0.38, 0.97);
-/// The first of these for a spring or play and its rotor: what sways in time resembles a resonance more than any other law.
-const A_DRIVE_THERE: f64 = 0.1;
+const THERE: (f64, f64) = (0.45, 0.98);
 
 /// The part of effects with such an evidence that are there.
-fn calibrated(evidence: f64, least: f64) -> f64 {
-    least + (THERE.1 - least) * evidence
+fn calibrated(evidence: f64) -> f64 {
+    THERE.0 + (THERE.1 - THERE.0) * evidence
 }
 
 /// Everything a diagnosis gives.
@@ -338,7 +336,7 @@ impl Logs<'_> {
         progress("intervals", 0.85);
         let everything = |_: usize| true;
         let squares = |rows: &Rows| gap::squares(&self.band, rows, everything);
-        let floor_rms = gap::weighted_rms(&floor.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &weights);
+        let floor_rms = gap::weighted_floor(&floor, &weights);
         let torque = gap::change(&squares(&before.rows), &squares(&after.rows), &weights, floor_rms);
         let (one_step, rollout) = before.errors.change(&after.errors, &weights);
         progress("networks", 0.95);
@@ -355,14 +353,14 @@ impl Logs<'_> {
         let counts = |i: usize| !pushes || calm(i);
         let concern = gap::weights_of_concern(model, &self.signals, &self.moving);
         let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, counts)), &concern);
-        let floor_of_concern =
-            gap::weighted_rms(&floor.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &concern);
+        let floor_of_concern = gap::weighted_floor(&floor, &concern);
         let typical = |rows: &Rows| gap::typical(&gap::squares(&self.band, rows, counts), &concern);
         let chatters = effects.iter().any(|e| e.kind() == Kind::Backlash);
         let size = |rows: &Rows| if chatters { typical(rows) } else { rms(rows) };
         let judged = verdict::Judged { before: size(&before.rows), after: size(&after.rows), floor: floor_of_concern };
         let unexplained = judged.unexplained_fraction();
-        let verdict = judged.verdict(effects.is_empty());
+        let verdict =
+            judged.verdict(effects.is_empty(), fit.set.iter().any(|&c| problem.entries[c].candidate.kind.is_outside()));
         // What a law outside the catalogue accounts for does not speak against the effects beside it.
         let beside = self.beside_outside(problem, &fit.set, &after.rows);
         let beside = verdict::Judged { after: size(&beside), ..judged };
@@ -462,15 +460,13 @@ impl Logs<'_> {
             if late.is_some_and(|doubt| doubt > INDISTINGUISHABLE) {
                 confused.extend(select::LATE.iter().filter(|other| **other != kind).map(|k| k.name().to_owned()));
             }
-            let of_a_drive = own.iter().any(|&c| problem.entries[c].candidate.turns());
-            let least = if of_a_drive { A_DRIVE_THERE } else { THERE.0 };
             let loss = rival.map_or(0.0, |r| r.choice.blocks.iter().sum::<f64>());
             found.push((
                 loss,
                 FoundEffect {
                     kind: kind.name().to_owned(),
                     joints: effect.law().joints(),
-                    confidence: calibrated((1.0 - doubt) * (1.0 - misfit).powi(MISFIT), least),
+                    confidence: calibrated((1.0 - doubt) * (1.0 - misfit).powi(MISFIT)),
                     parameters: fit.parameters(problem, self.model, kind, &own),
                     indistinguishable_from: confused,
                     shrink: EffectShrink { torque: shrink },

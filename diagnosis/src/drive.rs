@@ -9,11 +9,13 @@
 use crate::band::Row;
 use crate::corrected::{aligned, plant_pushed};
 use crate::diagnose::Logs;
+use crate::estimate::Fit;
 use crate::floor::noise_floor;
 use crate::gap;
 use crate::kernel::apply;
+use crate::problem::Problem;
 use crate::signals::{Signals, derivative_kernel};
-use gapscope_effects::{Candidate, Effect, EffectError, EncoderSide, JointRun, Kind};
+use gapscope_effects::{Candidate, EffectError, EncoderSide, JointRun, Kind};
 use nalgebra::{Matrix2, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -74,13 +76,27 @@ struct Study<'a> {
 impl Logs<'_> {
     /// The best account of each joint's drive that is better than a rigid one, beside other effects, none of them such a
     /// drive; best first.
-    pub(crate) fn accounts(&self, others: &[Effect], alignment: f64) -> Result<Vec<Account>, EffectError> {
+    pub(crate) fn accounts(&self, problem: &Problem, others: &Fit) -> Result<Vec<Account>, EffectError> {
+        let effects = others.effects(problem, self.model);
+        let outside: Vec<usize> =
+            others.set.iter().copied().filter(|&c| problem.entries[c].candidate.kind.is_outside()).collect();
         let runs: Vec<Vec<JointRun>> = self
             .signals
             .par_iter()
             .map(|s| {
-                let mut plant = plant_pushed(self.model, others, EncoderSide::Link, s.dt, &s.pushed)?;
-                Ok(aligned(self.model, s, &self.still, alignment, |motion| plant.joint_runs(motion)))
+                let mut plant = plant_pushed(self.model, &effects, EncoderSide::Link, s.dt, &s.pushed)?;
+                let mut runs =
+                    aligned(self.model, s, &self.still, others.alignment(), |motion| plant.joint_runs(motion));
+                // What a law outside the catalogue takes is as good as taken by the link.
+                for &c in &outside {
+                    let columns = problem.entries[c].candidate.columns(&s.motion(self.model, &self.still));
+                    for (column, theta) in columns.iter().zip(others.own(problem, c).1) {
+                        for (j, torque) in &column.rows {
+                            runs[*j].rest.iter_mut().zip(torque).for_each(|(rest, torque)| *rest -= theta * torque);
+                        }
+                    }
+                }
+                Ok(runs)
             })
             .collect::<Result<_, EffectError>>()?;
         let moving: Vec<usize> = (0..self.model.dof()).filter(|&j| self.moving[j]).collect();

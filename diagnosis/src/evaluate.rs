@@ -49,7 +49,7 @@ pub fn evaluate(
         None => nominal.clone(),
     };
     let floor = noise_floor(&signals, &band, &after, n, corrected.map_or(0.0, |c| floor::lag(&c.effects)));
-    let floor_rms = gap::weighted_rms(&floor.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>(), &weights);
+    let floor_rms = gap::weighted_floor(&floor, &weights);
     let (before_rows, after_rows) = (gap::at_rows(&band, &nominal, n), gap::at_rows(&band, &after, n));
     let before_errors = horizon::errors_of(&signals, &band, model, |dt| Plant::nominal(model, dt));
     let change_where = |keep: &dyn Fn(usize) -> bool| {

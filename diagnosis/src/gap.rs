@@ -92,6 +92,12 @@ pub fn weighted_rms(sums: &[f64], weights: &[f64]) -> f64 {
     (weights.iter().zip(sums).map(|(w, s)| w * w * s / count).sum::<f64>() / used).sqrt()
 }
 
+/// The same of noise floors, one a joint, N m or N.
+pub fn weighted_floor(floor: &[f64], weights: &[f64]) -> f64 {
+    let squares: Vec<f64> = floor.iter().map(|f| f * f).chain([1.0]).collect();
+    weighted_rms(&squares, weights)
+}
+
 /// A figure for each joint by name.
 pub fn by_joint(model: &Model, values: impl IntoIterator<Item = f64>) -> PerJoint {
     model.joints().iter().map(|j| j.name.clone()).zip(values).collect()

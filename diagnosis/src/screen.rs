@@ -1,7 +1,7 @@
 //! A first look at knobs with too many places to try: only the best few go on.
 
 use crate::refine::Data;
-use gapscope_effects::{Candidate, Kind, Range};
+use gapscope_effects::{Candidate, Column, Kind, Range};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -15,12 +15,13 @@ const APART: f64 = 1.15;
 const POWERS: i32 = 5;
 
 /// The ripples that take most out of each joint's residual (`[episode][joint][signal]`) beside a smooth function of pose
-/// and speed.
-pub fn ripples(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>]) -> Vec<Candidate> {
+/// and speed and beside some candidates.
+pub fn ripples(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>], beside: &[Candidate]) -> Vec<Candidate> {
     per_joint(
         data,
         ranges,
         residuals,
+        beside,
         |j| Candidate::ripples(j, &ranges[j]),
         |scored| {
             let mut kept: Vec<Candidate> = Vec::new();
@@ -35,13 +36,14 @@ pub fn ripples(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>]) -
     )
 }
 
-/// The places of each joint's travel at which friction or torque of their own would take most out of it.
-pub fn places(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>]) -> Vec<Candidate> {
+/// The places of each joint's travel at which friction or torque of their own would take most out of it, seen the same way.
+pub fn places(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>], beside: &[Candidate]) -> Vec<Candidate> {
     let of = |kind| {
         per_joint(
             data,
             ranges,
             residuals,
+            beside,
             |j| Candidate::places(kind, j, &ranges[j]),
             |mut scored| {
                 scored.truncate(PLACES);
@@ -57,10 +59,16 @@ fn per_joint(
     data: &Data<'_>,
     ranges: &[Range],
     residuals: &[Vec<Vec<f64>>],
+    beside: &[Candidate],
     candidates: impl Fn(usize) -> Vec<Candidate> + Sync,
     keep: impl Fn(Vec<Candidate>) -> Vec<Candidate> + Sync,
 ) -> Vec<Candidate> {
     let joints: Vec<usize> = (0..ranges.len()).filter(|&j| data.moving[j]).collect();
+    let columns = |candidate: &Candidate| -> Vec<Vec<Column>> {
+        data.signals.iter().map(|s| candidate.columns(&s.motion(data.model, data.standstill))).collect()
+    };
+    // Of each candidate beside, `[episode][column]`.
+    let beside: Vec<Vec<Vec<Column>>> = beside.par_iter().map(columns).collect();
     joints
         .into_par_iter()
         .flat_map(|j| {
@@ -80,6 +88,14 @@ fn per_joint(
             base.push(at_rows(&|e| {
                 data.signals[e].v[j].iter().map(|v| (v / data.standstill[j]).clamp(-1.0, 1.0)).collect()
             }));
+            for runs in &beside {
+                for i in 0..runs[0].len() {
+                    let own = |e: usize| runs[e][i].rows.iter().find(|(row, _)| *row == j).map(|(_, x)| x.clone());
+                    if own(0).is_some() {
+                        base.push(at_rows(&|e| own(e).unwrap_or_default()));
+                    }
+                }
+            }
             let target = at_rows(&|e| residuals[e][j].clone());
             let x = DMatrix::from_fn(target.len(), base.len(), |r, c| base[c][r]);
             let q = x.qr().q();
@@ -90,8 +106,7 @@ fn per_joint(
             };
             let rest = project(&target);
             let gain = |candidate: &Candidate| {
-                let runs: Vec<_> =
-                    data.signals.iter().map(|s| candidate.columns(&s.motion(data.model, data.standstill))).collect();
+                let runs = columns(candidate);
                 let columns: Vec<DVector<f64>> =
                     (0..runs[0].len()).map(|i| project(&at_rows(&|e| runs[e][i].rows[0].1.clone()))).collect();
                 let k = columns.len();

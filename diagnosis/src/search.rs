@@ -20,8 +20,15 @@ use statrs::function::erf::erfc;
 const CLEAR: f64 = 8.0;
 /// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
 const MANY: usize = 3;
-/// Laws outside the catalogue are let in where with them this part of the gap is left.
-const OPEN: f64 = 0.7;
+/// Laws outside the catalogue are let in where with them this part of what is more than noise is left.
+const OPEN: f64 = 0.75;
+/// A drive is an account of its joint if with it this part of what the joint was left with is left, ...
+const OF_JOINT: f64 = 0.25;
+/// ... or so many times the noise, ...
+const OF_FLOOR: f64 = 3.0;
+/// ... or what is nobody's concern, as a part of the effort's variation. A resonance of its own takes half of anything that
+/// sways.
+const OF_EFFORT: f64 = 0.01;
 /// Another account of a drive is better where it leaves this part of the gap.
 const BETTER: f64 = 0.95;
 /// Times that the choice is made, each around the exact parameters of the one before.
@@ -93,9 +100,9 @@ impl Logs<'_> {
     ///
     /// What the normal equations promise is held against the torque that the plant really predicts on held-out data. Where
     /// many kinds stand together or leave much, flexible laws may have bent to what none of them is: then the linear kinds
-    /// alone have their turn, and stay if they predict as well with no more of them. Where much is left, laws outside the
-    /// catalogue compete, so that effects are chosen beside what they do not explain instead of bent to it. A set that makes
-    /// the gap larger is no explanation: then the next choice does without the kinds that promise most.
+    /// alone have their turn, and stay if they predict as well with no more of them. Where more than noise is left, laws
+    /// outside the catalogue compete, so that effects are chosen beside what they do not explain instead of bent to it. A set
+    /// that makes the gap larger is no explanation: then the next choice does without the kinds that promise most.
     pub(crate) fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
         let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, |_| true)), &weights);
@@ -110,8 +117,7 @@ impl Logs<'_> {
             tried(self.choose_among(&[kinds, &Kind::OUTSIDE].concat(), progress)?)
         };
         let mut best = without(&[])?;
-        let floor = best.chosen.noise.iter().map(|f| f * f).chain([1.0]).collect::<Vec<_>>();
-        let floor = gap::weighted_rms(&floor, &weights);
+        let floor = gap::weighted_floor(&best.chosen.noise, &weights);
         let judged = |tried: &Tried| verdict::Judged { before, after: tried.left, floor };
         let flexible: Vec<Kind> = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k)).collect();
         let bends = best.kinds.iter().any(|kind| flexible.contains(kind));
@@ -122,17 +128,25 @@ impl Logs<'_> {
             }
         }
         let mut open = None;
-        if judged(&best).leaves_much() {
-            open = Some(tried(self.choose_among(&[], progress)?)?).filter(|open| open.left < OPEN * best.left);
+        if judged(&best).leaves_any() && best.left > UNNOTICED {
+            let beyond = |tried: &Tried| (tried.left.powi(2) - floor.powi(2)).max(0.0).sqrt();
+            let part = OPEN * beyond(&best);
+            open = Some(tried(self.choose_among(&[], progress)?)?).filter(|open| beyond(open) < part);
         }
-        let all_said = open.as_ref().is_some_and(|open| !judged(open).leaves_any());
-        let stands_in = best.kinds.iter().any(|kind| STANDS_IN.contains(kind));
-        let explained_otherwise = stands_in && judged(&best).unexplained_fraction() > ALL_BUT;
-        if !all_said && best.left > UNNOTICED && (judged(&best).leaves_any() || explained_otherwise) {
+        let much = judged(&best).leaves_much();
+        let drives = |tried: &Tried| {
+            let stands_in = tried.kinds.iter().any(|kind| STANDS_IN.contains(kind));
+            let explained_otherwise = stands_in && judged(tried).unexplained_fraction() > ALL_BUT;
+            tried.left > UNNOTICED && (judged(tried).leaves_any() || explained_otherwise)
+        };
+        if drives(&best) && open.as_ref().is_none_or(|open| judged(open).leaves_any()) {
             best = tried(self.drive(best.chosen, progress)?)?;
         }
-        if let Some(open) = open.filter(|open| open.left < best.left) {
-            return self.constant(open.chosen);
+        if let Some(mut open) = open.filter(|open| open.left < best.left) {
+            if drives(&open) {
+                open = tried(self.drive(open.chosen, progress)?)?;
+            }
+            return if much { self.constant(open.chosen) } else { Ok(open.chosen) };
         }
         if best.kinds.is_empty() || best.left < before {
             return if judged(&best).leaves_most() { self.constant(best.chosen) } else { Ok(best.chosen) };
@@ -152,7 +166,7 @@ impl Logs<'_> {
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
         let blocks = |chosen: &Chosen| -> Result<Vec<Vec<f64>>, EffectError> {
             let rows = self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows;
-            Ok(gap::squares(&self.band, &rows, |_| true))
+            Ok(gap::squares(&self.band, &self.beside_outside(&chosen.exact, &chosen.fit.set, &rows), |_| true))
         };
         let kinds = |chosen: &Chosen| select::kinds(&chosen.exact, &chosen.fit.set).len() as f64;
         let mut better: Option<(f64, Chosen)> = None;
@@ -164,19 +178,17 @@ impl Logs<'_> {
         for gone in [&[Kind::Armature][..], &STANDS_IN] {
             let all_but =
                 |out: &[usize]| (0..best.exact.entries.len()).filter(|i| !out.contains(i)).collect::<Vec<_>>();
-            let (effects, alignment) = if gone == STANDS_IN {
+            let others = if gone == STANDS_IN {
                 if stand_ins == rotors {
                     continue;
                 }
                 let rest: Vec<Candidate> =
                     all_but(&stand_ins).into_iter().map(|i| best.exact.entries[i].candidate.clone()).collect();
-                let (exact, fit) = self.data(&best.noise).refine(&rest)?;
-                (fit.effects(&exact, self.model), fit.alignment())
+                self.data(&best.noise).refine(&rest)?
             } else {
-                let fit = Fit { set: all_but(&rotors), ..best.fit.clone() };
-                (fit.effects(&best.exact, self.model), best.fit.alignment())
+                (best.exact.clone(), Fit { set: all_but(&rotors), ..best.fit.clone() })
             };
-            for account in self.accounts(&effects, alignment)?.into_iter().take(ACCOUNTS) {
+            for account in self.accounts(&others.0, &others.1)?.into_iter().take(ACCOUNTS) {
                 let joint = account.drive.joints[0];
                 let rotor = Candidate::new(Kind::Armature, vec![joint]);
                 let Some(place) = best.all.entries.iter().position(|e| e.candidate == rotor) else { continue };
@@ -199,7 +211,9 @@ impl Logs<'_> {
                 let own: Vec<f64> = (0..weights.len()).map(|j| if j == joint { weights[j] } else { 0.0 }).collect();
                 let typical = |weights: &[f64]| (gap::mean_level(&before, weights), gap::mean_level(&after, weights));
                 let ((before, after), (own_before, own_after)) = (typical(&weights), typical(&own));
-                if there && own_after < BETTER * own_before && after <= before {
+                let own_floor = gap::weighted_floor(&next.noise, &own);
+                let enough = (OF_JOINT * own_before).max(OF_FLOOR * own_floor).max(OF_EFFORT);
+                if there && own_after < (BETTER * own_before).min(enough) && after <= before {
                     let level = after * (1.0 + A_KIND * kinds(&next));
                     if better.as_ref().is_none_or(|(least, _)| level < *least) {
                         better = Some((level, next));
@@ -251,19 +265,21 @@ impl Logs<'_> {
             })
             .collect();
         candidates.retain(|c| c.kind != Kind::TorqueSaturation || c.shape > typical[c.joints[0]]);
-        candidates.extend(screen::ripples(&data, &ranges, &residuals));
-        if Kind::OUTSIDE.iter().any(|kind| !forbidden.contains(kind)) {
-            candidates.extend(Candidate::outside(self.model));
-            candidates.extend(screen::places(&data, &ranges, &residuals));
+        let open = Kind::OUTSIDE.iter().any(|kind| !forbidden.contains(kind));
+        let outside = if open { Candidate::outside(self.model) } else { Vec::new() };
+        candidates.extend(screen::ripples(&data, &ranges, &residuals, &outside));
+        if open {
+            candidates.extend(screen::places(&data, &ranges, &residuals, &outside));
         }
+        candidates.extend(outside);
         if self.signals.iter().any(|s| !s.pushed.is_empty()) {
             candidates.extend(Candidate::contacts(self.model));
         }
         candidates.retain(|c| !forbidden.contains(&c.kind));
-        let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
+        let term = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
         // A push is known by when it comes: it is no outlier.
         let weighing = [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact]].concat();
-        let mut all = data.problem(candidates.iter().map(open).collect(), &weighing);
+        let mut all = data.problem(candidates.iter().map(term).collect(), &weighing);
         progress("choosing effects", 0.2);
         let choice = select::choose(&mut all, &self.band, &[]);
         self.converge(all, choice.set, noise, None, progress)

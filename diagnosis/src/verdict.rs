@@ -52,9 +52,9 @@ impl Judged {
         self.leaves_much() && self.unexplained_fraction() > LARGE
     }
 
-    /// The answer in a word, by whether any effect was found.
-    pub fn verdict(&self, no_effects: bool) -> Verdict {
-        match (no_effects, self.leaves_much()) {
+    /// The answer in a word, by whether any effect was found, and whether a law outside the catalogue stands beside them.
+    pub fn verdict(&self, no_effects: bool, outside: bool) -> Verdict {
+        match (no_effects, self.leaves_much() || (outside && !no_effects)) {
             (true, false) => Verdict::NoGap,
             (true, true) => Verdict::UnknownEffect,
             (false, false) => Verdict::Explained,

@@ -203,6 +203,17 @@ impl Problem {
         part
     }
 
+    /// The same problem twice, with the same weights: the mean of each row with as many on either side, and what the row has
+    /// beyond it. A moving average of a law's torque is the law's on the moving average of its signature.
+    pub fn slow_and_fast(&self, band: &Band, reach: usize) -> [Problem; 2] {
+        [true, false].map(|slow| {
+            let mut part = self.clone();
+            part.joints.par_iter_mut().for_each(|joint| joint.smooth(band, reach, slow));
+            part.accumulate(band);
+            part
+        })
+    }
+
     /// Whether a robot could have an entry with these coefficients. A law that wants to be more than its bounds is some
     /// other law (nothing at all, zero, it can be).
     pub fn plausible(&self, c: usize, theta: &[f64]) -> bool {
@@ -297,6 +308,35 @@ impl JointRows {
     fn gap(&self) -> f64 {
         let sum: f64 = self.linear_target.iter().map(|x| x * x).sum();
         (sum / self.linear_target.len().max(1) as f64).sqrt()
+    }
+
+    /// Each row becomes its mean with the `reach` rows on either side, or what it has beyond that mean. Rows near a gap
+    /// or an end are nothing after it.
+    fn smooth(&mut self, band: &Band, reach: usize, slow: bool) {
+        let m = self.columns.len();
+        let episode = |i: usize| band.rows[self.rows[i]].episode;
+        let whole = |i: usize| {
+            let (first, last) = (i.checked_sub(reach), i + reach);
+            first.filter(|&first| {
+                last < self.rows.len()
+                    && self.rows[last] - self.rows[first] == 2 * reach
+                    && episode(first) == episode(last)
+            })
+        };
+        let part = |own: f64, sum: f64| {
+            let mean = sum / (2 * reach + 1) as f64;
+            if slow { mean } else { own - mean }
+        };
+        let (mut values, mut target) = (vec![0.0; self.values.len()], vec![0.0; self.target.len()]);
+        for i in 0..self.rows.len() {
+            let Some(first) = whole(i) else { continue };
+            let near = first..=i + reach;
+            target[i] = part(self.target[i], self.target[near.clone()].iter().sum());
+            for c in 0..m {
+                values[i * m + c] = part(self.values[i * m + c], near.clone().map(|k| self.values[k * m + c]).sum());
+            }
+        }
+        (self.values, self.target) = (values, target);
     }
 
     fn predict(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {

@@ -1,0 +1,187 @@
+//! Signatures of effects with a knob or a memory against the plant, along whole runs.
+
+use crate::common;
+
+use common::robot;
+use gapscope_dynamics::{Data, Model};
+use gapscope_effects::{Candidate, Effect, EncoderSide, Kind, Motion, Plant, Range};
+
+const DT: f64 = 0.002;
+const SAMPLES: usize = 2000;
+const STILL: f64 = 0.02;
+
+/// A smooth run under the torque that the nominal robot needs for it and a little more.
+struct Run {
+    q: Vec<Vec<f64>>,
+    v: Vec<Vec<f64>>,
+    a: Vec<Vec<f64>>,
+    tau: Vec<Vec<f64>>,
+    nominal: Vec<Vec<f64>>,
+    still: Vec<f64>,
+}
+
+impl Run {
+    fn new(model: &Model) -> Run {
+        let n = model.dof();
+        let wave = |j: usize, k: usize, order: i32| {
+            let (omega, phase) = (1.5 + 0.7 * j as f64, 0.4 * j as f64);
+            let turned = omega * k as f64 * DT + phase + f64::from(order) * std::f64::consts::FRAC_PI_2;
+            0.8 * omega.powi(order) * turned.sin()
+        };
+        let signal =
+            |order| -> Vec<Vec<f64>> { (0..n).map(|j| (0..SAMPLES).map(|k| wave(j, k, order)).collect()).collect() };
+        let (q, v, a) = (signal(0), signal(1), signal(2));
+        let mut data = Data::new(model);
+        let (mut nominal, mut torque) = (vec![Vec::new(); n], vec![0.0; n]);
+        for k in 0..SAMPLES {
+            let at = |x: &[Vec<f64>]| x.iter().map(|joint| joint[k]).collect::<Vec<f64>>();
+            model.inverse_dynamics(&mut data, &at(&q), &at(&v), &at(&a), &mut torque);
+            nominal.iter_mut().zip(&torque).for_each(|(row, t)| row.push(*t));
+        }
+        let tau = nominal.iter().zip(&v).map(|(t, v)| t.iter().zip(v).map(|(t, v)| t + 0.3 * v).collect()).collect();
+        Run { q, v, a, tau, nominal, still: vec![STILL; n] }
+    }
+
+    fn motion<'a>(&'a self, model: &'a Model) -> Motion<'a> {
+        let Run { q, v, a, tau, nominal, still } = self;
+        Motion {
+            model,
+            q,
+            v,
+            a,
+            tau,
+            nominal,
+            held: None,
+            dt: DT,
+            start: 0.5,
+            pushed: &[[1.0, 2.0]],
+            standstill: still,
+        }
+    }
+}
+
+/// What a candidate with coefficients adds to the residual by its columns and by the plant, and the greatest of both where
+/// every joint moves, away from the ends of the run.
+fn compare(model: &Model, candidate: &Candidate, theta: &[f64]) -> (f64, f64) {
+    compare_on(&Run::new(model), model, candidate, theta)
+}
+
+fn compare_on(run: &Run, model: &Model, candidate: &Candidate, theta: &[f64]) -> (f64, f64) {
+    let motion = run.motion(model);
+    let mut effects = candidate.effects(model, theta);
+    assert!(effects.iter().any(|e| e.kind() == candidate.kind), "{candidate:?} gives {effects:?}");
+    for effect in &mut effects {
+        if let Effect::ExternalContact(contact) = effect {
+            contact.intervals = motion.pushed.to_vec();
+        }
+    }
+    let without = Plant::nominal(model, DT).residuals(&motion);
+    let mut plant = Plant::new(model, &effects, DT).unwrap();
+    if candidate.side == EncoderSide::Motor {
+        plant = plant.with_motor_encoders();
+    }
+    let with = plant.residuals(&motion);
+    let columns = candidate.columns(&motion);
+    assert_eq!(columns.len(), theta.len(), "{candidate:?}");
+    let (mut worst, mut largest) = (0.0f64, 0.0f64);
+    for j in 0..model.dof() {
+        for k in 150..SAMPLES - 150 {
+            if run.v.iter().any(|v| v[k].abs() < STILL) {
+                continue;
+            }
+            let sum: f64 = columns
+                .iter()
+                .zip(theta)
+                .flat_map(|(c, t)| c.rows.iter().filter(|(row, _)| *row == j).map(move |(_, x)| t * x[k]))
+                .sum();
+            let added = without[j][k] - with[j][k];
+            worst = worst.max((added - sum).abs());
+            largest = largest.max(added.abs());
+        }
+    }
+    (worst, largest)
+}
+
+fn with_shape(kind: Kind, joints: Vec<usize>, shape: f64) -> Candidate {
+    Candidate { shape, ..Candidate::new(kind, joints) }
+}
+
+#[test]
+fn columns_with_a_knob_are_what_the_effect_adds() {
+    let model = robot("arm6");
+    for (candidate, theta) in [
+        (with_shape(Kind::StribeckFriction, vec![1], 0.3), vec![2.0, 1.5]),
+        (with_shape(Kind::PreslidingFriction, vec![2], 40.0), vec![3.0]),
+        (with_shape(Kind::ThermalDrift, vec![0], 2.5), vec![1.0, 2.0]),
+        (with_shape(Kind::TorqueSaturation, vec![1], 20.0), vec![1.0]),
+        (with_shape(Kind::TorqueRipple, vec![3], 12.0), vec![0.4, -0.3]),
+        (with_shape(Kind::ActuationDelay, vec![], 0.0071), vec![0.0071]),
+        (with_shape(Kind::ActuatorLag, vec![], 0.012), vec![0.012]),
+        (Candidate::new(Kind::ExternalContact, vec![5]), vec![5.0, -3.0, 8.0]),
+    ] {
+        let (worst, largest) = compare(&model, &candidate, &theta);
+        // A push begins inside a sample for the plant and at one for its signature.
+        assert!(largest > 0.01, "{candidate:?} adds {largest:e}");
+        let edge = if candidate.kind == Kind::ExternalContact { 0.6 } else { 1e-9 };
+        assert!(worst < edge * largest, "{candidate:?} differs by {worst:e} of {largest:e}");
+    }
+}
+
+/// Halving what is small quarters what the first order leaves out.
+#[test]
+fn columns_of_offset_and_load_are_exact_to_first_order() {
+    let model = robot("arm6");
+    for (candidate, theta) in [
+        (Candidate::new(Kind::JointZeroOffset, vec![1]), vec![0.02]),
+        (Candidate::new(Kind::LoadDependentFriction, vec![2]), vec![0.08]),
+    ] {
+        let half: Vec<f64> = theta.iter().map(|t| 0.5 * t).collect();
+        let ((whole, largest), (half, _)) = (compare(&model, &candidate, &theta), compare(&model, &candidate, &half));
+        assert!(whole < 0.1 * largest, "{candidate:?}: {whole:e} of {largest:e}");
+        assert!(half < 0.35 * whole, "{candidate:?}: {half:e} at half of what leaves {whole:e}");
+    }
+}
+
+/// With a rotor as heavy as its link, which a signature takes for granted, an elastic drive adds what its columns say, on
+/// either side of the encoder.
+#[test]
+fn knobs_lie_in_the_range_of_the_joint() {
+    let range = Range { speed: 2.0, least: -0.7, span: 1.5, torque: 30.0, duration: 10.0 };
+    for candidate in Candidate::knobs(std::slice::from_ref(&range)).into_iter().chain(Candidate::ripples(0, &range)) {
+        assert!(candidate.shape.is_finite() && candidate.shape > 0.0, "{candidate:?}");
+    }
+    let idle = Range { speed: 0.0, least: 0.0, span: 0.0, torque: 0.0, duration: 0.0 };
+    let kinds: Vec<Kind> = Candidate::knobs(std::slice::from_ref(&idle)).iter().map(|c| c.kind).collect();
+    assert!(kinds.iter().all(|k| matches!(k, Kind::ActuationDelay | Kind::ActuatorLag)), "{kinds:?}");
+    assert!(Candidate::ripples(0, &idle).is_empty());
+}
+
+/// A joint looked at alone, all else along its measured motion, leaves what the whole plant leaves of it.
+#[test]
+fn one_joint_alone_is_the_plant_to_first_order() {
+    let model = robot("arm6");
+    let run = Run::new(&model);
+    let motion = run.motion(&model);
+    let (joint, rotor) = (1, 0.8);
+    let runs = Plant::nominal(&model, DT).joint_runs(&motion);
+    let inertia = runs[joint].inertia.iter().sum::<f64>() / SAMPLES as f64;
+    for side in [EncoderSide::Link, EncoderSide::Motor] {
+        for (kind, shape) in [(Kind::Armature, 0.0), (Kind::JointElasticity, 9.0), (Kind::Backlash, 0.004)] {
+            let drive = Candidate { shape, side, inertia, ..Candidate::new(kind, vec![joint]) };
+            let mut plant = Plant::new(&model, &drive.effects(&model, &[rotor]), DT).unwrap();
+            if side == EncoderSide::Motor {
+                plant = plant.with_motor_encoders();
+            }
+            let whole = &plant.residuals(&motion)[joint];
+            let alone = runs[joint].left_by(&drive, rotor);
+            let rigid = runs[joint].left_by(&Candidate::new(Kind::Armature, vec![joint]), rotor);
+            let rms = |x: &[f64], y: &[f64]| {
+                (x.iter().zip(y).skip(400).map(|(x, y)| (x - y).powi(2)).sum::<f64>() / (SAMPLES - 400) as f64).sqrt()
+            };
+            let (differs, adds) = (rms(whole, &alone), rms(whole, &rigid));
+            let bends = if kind == Kind::Armature || drive.side == EncoderSide::Link { 0.05 } else { 0.1 };
+            assert!(differs < 1e-12 + bends * adds, "{kind:?} {side:?}: differ by {differs:e} of {adds:e}");
+            assert!(kind == Kind::Armature || adds > 5e-3, "{kind:?} {side:?} adds {adds:e}");
+        }
+    }
+}

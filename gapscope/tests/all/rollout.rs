@@ -1,0 +1,77 @@
+//! `gapscope rollout` with networks that `gapscope train` wrote.
+
+use gapscope_datasets::{Recipe, generate, write_csv};
+use gapscope_dynamics::robots;
+use gapscope_effects::{Effect, ViscousFriction};
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn gapscope(folder: &Path, arguments: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_gapscope")).current_dir(folder).args(arguments.split(' ')).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+}
+
+#[test]
+fn networks_stand_beside_the_nominal_model_and_what_does_not_fit_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path();
+    let model = robots::model("double_pendulum").unwrap().unwrap().model;
+    let viscous = model.joints().iter().map(|j| (j.name.clone(), 0.2)).collect();
+    let effect = Effect::ViscousFriction(ViscousFriction { viscous });
+    let recipe = Recipe { seconds: 12.0, rate: 200.0, ..Recipe::default() };
+    let log = generate(&model, &[effect], 3, &recipe, "log.csv").unwrap();
+    write_csv(folder.join("log.csv"), &log, true).unwrap();
+    std::fs::write(folder.join("robot.urdf"), robots::double_pendulum()).unwrap();
+    let network = "robot.urdf log.csv --hidden 16 --epochs 60 --rate 0.01 --cosine --out";
+    for arguments in
+        [format!("train residual {network} residual --on acceleration"), format!("train pure {network} pure")]
+    {
+        let output = gapscope(folder, &arguments);
+        assert!(output.status.success(), "{}", said(&output));
+    }
+
+    let rollout = |more: &str| {
+        let arguments = format!("rollout robot.urdf log.csv --horizon 0.3 --starts 30 --out page.html --force {more}");
+        gapscope(folder, &arguments)
+    };
+    let output = rollout("--residual residual --pure pure/weights.json");
+    let text = said(&output);
+    assert!(output.status.success() && text.contains("hybrid") && text.contains("pure"), "{text}");
+    // The last horizon: nominal, hybrid, how many times less, pure, how many times less.
+    let row = text.lines().find(|line| line.starts_with("0.3 ")).unwrap();
+    let cells: Vec<&str> = row.split_whitespace().collect();
+    let times: f64 = cells[4].parse().unwrap();
+    assert!(cells[3] == "÷" && times > 2.0, "the residual takes friction away: {row}");
+    let page = std::fs::read_to_string(folder.join("page.html")).unwrap();
+    assert!(page.contains("with a residual network") && page.contains("network alone") && !page.contains("NaN"));
+
+    for (more, told) in [
+        ("--residual pure", "--pure"),
+        ("--pure residual", "--residual"),
+        ("--residual nowhere", "nowhere"),
+        ("--residual residual/training.json", "holds no weights"),
+        ("--residual residual/learning_curve.csv", ".safetensors"),
+    ] {
+        let output = rollout(more);
+        assert!(output.status.code() == Some(1) && said(&output).contains(told), "{more}: {}", said(&output));
+    }
+    let spoil = |file: &str, from: &str, to: &str| {
+        let path = folder.join("residual").join(file);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{text}");
+        std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+        let told = said(&rollout("--residual residual"));
+        std::fs::write(&path, text).unwrap();
+        told
+    };
+    assert!(spoil("training.json", "joint1", "elbow").contains("elbow"));
+    assert!(spoil("training.json", "\"acceleration\"", "\"next-state\"").contains("6 to 4"));
+    assert!(spoil("training.json", "\"dt\": 0.01", "\"dt\": 0.0123").contains("--dt 0.01"));
+    assert!(spoil("training.json", "gapscope.training/1", "another/1").contains("another/1"));
+    assert!(spoil("training.json", "{", "").contains("no record"));
+    std::fs::remove_file(folder.join("pure/training.json")).unwrap();
+    assert!(said(&rollout("--pure pure")).contains("pure/training.json"));
+}

@@ -1,0 +1,70 @@
+//! A spring or play in one drive of an arm is named with its parameters, whichever side its encoder is on.
+
+use gapscope_datasets::{Recipe, generate};
+use gapscope_diagnosis::schema::{Parameter, Quantity, Verdict};
+use gapscope_dynamics::Data;
+use gapscope_effects::{Armature, Backlash, Effect, JointElasticity};
+use gapscope_tests::{diagnose, robot};
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+const JOINT: usize = 2;
+/// Resonance of the link on its locked motor, Hz.
+const RESONANCE: f64 = 5.0;
+
+/// What is named of a spring or play in the third joint of the six, beside a rotor as heavy as nine tenths of the link.
+fn named(play: Option<f64>, motor_encoders: bool) {
+    let model = robot("arm6");
+    let n = model.dof();
+    let mut mass = DMatrix::zeros(n, n);
+    model.mass_matrix(&mut Data::new(&model), &vec![0.3; n], &mut mass);
+    let inertia = mass[(JOINT, JOINT)];
+    let name = model.joints()[JOINT].name.clone();
+    let on = |value: f64| -> BTreeMap<String, f64> { [(name.clone(), value)].into() };
+    let stiffness = inertia * (std::f64::consts::TAU * RESONANCE).powi(2);
+    let drive = match play {
+        Some(gap) => Effect::Backlash(Backlash { gap: on(gap) }),
+        None => Effect::JointElasticity(JointElasticity {
+            stiffness: on(stiffness),
+            damping: on(0.1 * (stiffness * inertia).sqrt()),
+        }),
+    };
+    let effects = [drive.clone(), Effect::Armature(Armature { armature: on(0.9 * inertia) })];
+    let recipe = Recipe { seconds: 10.0, motor_encoders, ..Recipe::default() };
+    let logs: Vec<_> =
+        (1..4).map(|seed| generate(&model, &effects, seed, &recipe, &format!("log_{seed}.csv")).unwrap()).collect();
+    let diagnosis = diagnose(&model, &logs).diagnosis;
+    let told = format!("{:?} {:#?}", diagnosis.verdict, diagnosis.effects);
+    assert_eq!(diagnosis.verdict, Verdict::Explained, "{told}");
+    let kinds: Vec<&str> = diagnosis.effects.iter().map(|e| e.kind.as_str()).collect();
+    assert_eq!(kinds, [drive.kind().name(), "armature"], "{told}");
+    for (found, effect) in diagnosis.effects.iter().zip(&effects) {
+        assert_eq!(found.joints, std::slice::from_ref(&name), "{told}");
+        assert!(found.confidence > 0.9, "{told}");
+        // The damping is taken for granted, not found.
+        let parameter = &effect.law().parameters()[0];
+        let Some(Parameter::PerJoint(map)) = found.parameters.get(parameter.name) else { panic!("{told}") };
+        let Quantity::Scalar(value) = map[&name].value else { panic!("{told}") };
+        assert!((value / parameter.value[0] - 1.0).abs() < 0.03, "{}: {told}", parameter.name);
+    }
+}
+
+#[test]
+fn a_spring_behind_an_encoder_on_the_link() {
+    named(None, false);
+}
+
+#[test]
+fn a_spring_behind_an_encoder_on_the_motor() {
+    named(None, true);
+}
+
+#[test]
+fn play_behind_an_encoder_on_the_link() {
+    named(Some(0.02), false);
+}
+
+#[test]
+fn play_behind_an_encoder_on_the_motor() {
+    named(Some(0.02), true);
+}

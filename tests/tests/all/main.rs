@@ -1,0 +1,14 @@
+//! Properties and validations that cross crates. One binary for all of them: each one more is linked again.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
+
+mod bank_sample;
+mod diagnosis;
+mod drives;
+mod late;
+mod learning;
+mod next_experiment;
+mod outside;
+mod power;
+mod real_logs;
+mod robots;
+mod rollouts;

@@ -1,0 +1,105 @@
+//! A law that the catalogue does not have: it is never named as an effect, an effect beside it still is, and what is left is
+//! told by what it resembles.
+
+use gapscope_datasets::{Episode, Recipe, Sensors, generate};
+use gapscope_diagnosis::schema::{Diagnosis, Verdict};
+use gapscope_dynamics::{Data, Model};
+use gapscope_effects::{Armature, Effect, ViscousFriction};
+use gapscope_tests::{diagnose, robot};
+use nalgebra::DMatrix;
+
+/// Torque that a law takes of the drives, from q and q̇.
+type Law = dyn Fn(&Model, &[f64], &[f64]) -> Vec<f64>;
+
+const ROBOT: &str = "double_pendulum";
+
+/// Drag of 0.5 N s²/m² on the last link.
+fn drag(model: &Model, q: &[f64], v: &[f64]) -> Vec<f64> {
+    let n = model.dof();
+    let mut jacobian = DMatrix::zeros(6, n);
+    let center = model.joints()[n - 1].inertia.center_of_mass().unwrap();
+    model.jacobian(&mut Data::new(model), q, n - 1, center, &mut jacobian);
+    let velocity: Vec<f64> = (0..3).map(|i| (0..n).map(|j| jacobian[(i, j)] * v[j]).sum()).collect();
+    let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
+    (0..n).map(|j| 0.5 * speed * (0..3).map(|i| jacobian[(i, j)] * velocity[i]).sum::<f64>()).collect()
+}
+
+/// A spot of 0.2 rad at which the second joint rubs with 0.3 N m.
+fn rub(model: &Model, q: &[f64], v: &[f64]) -> Vec<f64> {
+    let mut torque = vec![0.0; model.dof()];
+    torque[1] = 0.3 * (-((q[1] - 0.2) / 0.1).powi(2)).exp() * (v[1] / 0.01).tanh();
+    torque
+}
+
+/// A diagnosis of logs in which the drives also overcome a law: the motion is the same, the effort is larger.
+fn diagnosed(effects: &[Effect], law: &Law) -> Diagnosis {
+    let model = robot(ROBOT);
+    let n = model.dof();
+    let sensors = Sensors { position_noise: 1e-6, effort_noise: 1e-3, ..Sensors::default() };
+    let recipe = Recipe { sensors, ..Recipe::default() };
+    let log = |seed| -> Episode {
+        let mut log = generate(&model, effects, seed, &recipe, "log.csv").unwrap();
+        for k in 1..log.len() - 1 {
+            let dt = log.time[k + 1] - log.time[k];
+            let q: Vec<f64> = log.position.iter().map(|q| 0.5 * (q[k] + q[k + 1])).collect();
+            let v: Vec<f64> = log.position.iter().map(|q| (q[k + 1] - q[k]) / dt).collect();
+            let torque = law(&model, &q, &v);
+            (0..n).for_each(|j| log.effort[j][k] += torque[j]);
+        }
+        log
+    };
+    diagnose(&model, &(1..5).map(log).collect::<Vec<_>>()).diagnosis
+}
+
+fn laws(diagnosis: &Diagnosis) -> Vec<&str> {
+    let like = diagnosis.unexplained.resembles.as_ref();
+    like.map_or(vec![], |like| like.laws.iter().map(|l| l.law.as_str()).collect())
+}
+
+#[test]
+fn a_drag_alone_is_unknown_and_said_to_be_like_a_drag() {
+    let found = diagnosed(&[], &drag);
+    assert_eq!(found.verdict, Verdict::UnknownEffect, "{:#?}", found.effects);
+    assert!(found.effects.is_empty(), "{:#?}", found.effects);
+    assert_eq!(laws(&found), ["link_drag"]);
+    assert!(found.unexplained.resembles.unwrap().share > 0.95);
+}
+
+#[test]
+fn rotors_are_found_beside_a_drag() {
+    let model = robot(ROBOT);
+    let armature = model.joints().iter().map(|j| (j.name.clone(), 0.01)).collect();
+    let found = diagnosed(&[Effect::Armature(Armature { armature })], &drag);
+    assert_eq!(found.verdict, Verdict::PartlyExplained, "{:#?}", found.effects);
+    let kinds: Vec<&str> = found.effects.iter().map(|e| e.kind.as_str()).collect();
+    assert_eq!(kinds, ["armature"]);
+    assert!(found.effects[0].confidence > 0.9, "what the drag accounts for does not speak against the rotors");
+    assert_eq!(laws(&found), ["link_drag"]);
+}
+
+#[test]
+fn friction_is_found_beside_a_spot_that_rubs() {
+    let model = robot(ROBOT);
+    let viscous = model.joints().iter().map(|j| (j.name.clone(), 0.05)).collect();
+    let found = diagnosed(&[Effect::ViscousFriction(ViscousFriction { viscous })], &rub);
+    let kinds: Vec<&str> = found.effects.iter().map(|e| e.kind.as_str()).collect();
+    assert_eq!(kinds, ["viscous_friction"], "{:#?}", found.effects);
+    assert_eq!(found.effects[0].joints.len(), 2, "{:#?}", found.effects);
+    assert_eq!(found.verdict, Verdict::PartlyExplained);
+    assert!(laws(&found).contains(&"rub"), "{:?}", laws(&found));
+}
+
+/// A spot that rubs in one joint is a thousandth of the squared gap beside friction of that size, and of no concern by that;
+/// but what is left there is no noise, and a law that the catalogue does not have accounts for it.
+#[test]
+fn a_small_unknown_beside_a_large_effect_is_not_explained_away() {
+    let model = robot(ROBOT);
+    let viscous = model.joints().iter().map(|j| (j.name.clone(), 1.0)).collect();
+    let found = diagnosed(&[Effect::ViscousFriction(ViscousFriction { viscous })], &rub);
+    let kinds: Vec<&str> = found.effects.iter().map(|e| e.kind.as_str()).collect();
+    assert_eq!(kinds, ["viscous_friction"], "{:#?}", found.effects);
+    assert!(found.unexplained.fraction < 0.003, "{}", found.unexplained.fraction);
+    assert_eq!(found.verdict, Verdict::PartlyExplained);
+    assert_eq!(laws(&found), ["rub"]);
+    assert!(found.effects[0].confidence > 0.9, "{:#?}", found.effects);
+}

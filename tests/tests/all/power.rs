@@ -1,0 +1,66 @@
+//! The least sizes that a diagnosis says its logs would have revealed: what is well above is found, what is well below is not.
+
+use gapscope_datasets::Episode;
+use gapscope_diagnosis::schema::{Power, Verdict};
+use gapscope_dynamics::Model;
+use gapscope_effects::{Armature, CoulombFriction, Effect, Payload, TorqueBias, TorqueGainError, ViscousFriction};
+use gapscope_tests::{diagnose, robot, simulate};
+use std::collections::BTreeMap;
+
+fn logs(model: &Model, effects: &[Effect]) -> Vec<Episode> {
+    (1..4).map(|seed| simulate(model, effects, seed, 8.0, 250.0, 2e-6)).collect()
+}
+
+/// An effect of a kind at a joint, of a size.
+fn effect(model: &Model, power: &Power, size: f64) -> Effect {
+    let joint = power.joints[0].clone();
+    let one: BTreeMap<String, f64> = [(joint.clone(), size)].into();
+    match power.kind.as_str() {
+        "viscous_friction" => Effect::ViscousFriction(ViscousFriction { viscous: one }),
+        "coulomb_friction" => Effect::CoulombFriction(CoulombFriction { coulomb: one }),
+        "armature" => Effect::Armature(Armature { armature: one }),
+        "torque_bias" => Effect::TorqueBias(TorqueBias { bias: one }),
+        "torque_gain_error" => Effect::TorqueGainError(TorqueGainError { gain: [(joint, 1.0 - size)].into() }),
+        "payload" => {
+            let body = &model.joints()[model.joint_index(&joint).unwrap()].inertia;
+            let com = body.center_of_mass().unwrap().to_array();
+            Effect::Payload(Payload { joint, mass: size, com, inertia: [0.0; 6] })
+        }
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn sizes_are_those_that_are_found() {
+    let model = robot("arm6");
+    let nothing = diagnose(&model, &logs(&model, &[])).diagnosis;
+    assert_eq!(nothing.verdict, Verdict::NoGap);
+    let cases = [
+        ("viscous_friction", "joint2"),
+        ("coulomb_friction", "joint5"),
+        ("armature", "joint4"),
+        ("torque_bias", "joint1"),
+        ("torque_gain_error", "joint2"),
+        ("payload", "joint6"),
+    ];
+    let mut wrong = Vec::new();
+    for (kind, joint) in cases {
+        let of = |p: &&Power| p.kind == kind && p.joints == [joint];
+        let power = nothing.power.iter().find(of).unwrap_or_else(|| panic!("{kind} at {joint}"));
+        let size = power.size.unwrap();
+        for (part, seen) in [(0.4, false), (2.5, true)] {
+            let found = diagnose(&model, &logs(&model, &[effect(&model, power, part * size)])).diagnosis;
+            let kinds: Vec<&str> = found.effects.iter().map(|e| e.kind.as_str()).collect();
+            if kinds.contains(&kind) != seen {
+                wrong.push(format!("{kind} at {joint}, {part} × {size} {}: {kinds:?}", power.unit));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+
+    // Gravity lies along the first axis: no offset of its encoder moves any torque.
+    assert!(nothing.power.iter().all(|p| p.size.is_none_or(|size| size > 0.0)), "{:#?}", nothing.power);
+    let first = |kind: &str| nothing.power.iter().find(|p| p.kind == kind && p.joints == ["joint1"]).unwrap().size;
+    assert_eq!(first("joint_zero_offset"), None);
+    assert!(first("coulomb_friction").is_some());
+}

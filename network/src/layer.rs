@@ -102,7 +102,6 @@ fn in_panels<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usiz
     let (inputs, outputs) = (weights.len() / bias.len(), bias.len());
     let mut panel = Panel([[T::ZERO; WIDE]; DEEP]);
     for (x, y) in x.chunks(ROWS * inputs).zip(y.chunks_mut(ROWS * outputs)) {
-        y.chunks_exact_mut(outputs).for_each(|y| y.copy_from_slice(bias));
         for first in (0..outputs).step_by(WIDE) {
             let wide = WIDE.min(outputs - first);
             for from in (0..inputs).step_by(DEEP) {
@@ -111,16 +110,19 @@ fn in_panels<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usiz
                 for (panel, weights) in panel.0.iter_mut().zip(weights[from * outputs..].chunks_exact(outputs)) {
                     copy(panel, &weights[first..], wide);
                 }
+                let panel = &panel.0[..deep];
+                let bias = (from == 0).then_some(&bias[first..first + wide]);
                 let rows = y.len() / outputs;
                 let mut row = 0;
                 while row < rows {
                     let (x, y) = (&x[row * inputs + from..], &mut y[row * outputs + first..]);
                     row += match rows - row {
                         left if left >= TALL => {
-                            tile::<T, REGISTER, WIDE, TALL>(&panel.0[..deep], x, inputs, y, outputs, wide)
+                            tile::<T, REGISTER, WIDE, TALL>(panel, bias, x, inputs, y, outputs, wide)
                         }
-                        2.. => tile::<T, REGISTER, WIDE, 2>(&panel.0[..deep], x, inputs, y, outputs, wide),
-                        _ => tile::<T, REGISTER, WIDE, 1>(&panel.0[..deep], x, inputs, y, outputs, wide),
+                        4.. => tile::<T, REGISTER, WIDE, 4>(panel, bias, x, inputs, y, outputs, wide),
+                        2.. => tile::<T, REGISTER, WIDE, 2>(panel, bias, x, inputs, y, outputs, wide),
+                        _ => tile::<T, REGISTER, WIDE, 1>(panel, bias, x, inputs, y, outputs, wide),
                     };
                 }
             }
@@ -129,11 +131,12 @@ fn in_panels<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usiz
     }
 }
 
-/// Adds a panel's product with R rows of x, each `inputs` behind the one before, to `wide` outputs of as many rows of y;
-/// R.
+/// Adds a panel's product with R rows of x, each `inputs` behind the one before, to `wide` outputs of as many rows of y, or
+/// to the bias where there is one; R.
 #[inline(always)]
 fn tile<T: Real, const REGISTER: usize, const WIDE: usize, const R: usize>(
     panel: &[[T; WIDE]],
+    bias: Option<&[T]>,
     x: &[T],
     inputs: usize,
     y: &mut [T],
@@ -143,7 +146,7 @@ fn tile<T: Real, const REGISTER: usize, const WIDE: usize, const R: usize>(
     assert!(x.len() >= (R - 1) * inputs + panel.len() && wide <= WIDE);
     let mut sum = [[T::ZERO; WIDE]; R];
     for r in 0..R {
-        copy(&mut sum[r], &y[r * outputs..], wide);
+        copy(&mut sum[r], bias.unwrap_or(&y[r * outputs..]), wide);
     }
     for (k, weights) in panel.iter().enumerate() {
         for r in 0..R {

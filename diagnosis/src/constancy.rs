@@ -47,25 +47,24 @@ pub fn inconsistent(problem: &Problem, fit: &Fit, signals: &[Signals], band: &Ba
             })
         })
         .collect();
+    let always_there = |candidate: &Candidate| !OF_THE_MOMENT.contains(&candidate.kind) && !candidate.kind.is_outside();
     let mut found: Vec<(usize, f64)> = fit
         .set
         .iter()
+        .filter(|&&c| always_there(&problem.entries[c].candidate))
         .filter_map(|&c| {
             let candidate = &problem.entries[c].candidate;
             let asked = |joint: &Option<usize>| joint.is_none_or(|j| candidate.joints.contains(&j));
             let apart = thirds
                 .iter()
-                .filter(|(joint, _)| {
-                    asked(joint) && !OF_THE_MOMENT.contains(&candidate.kind) && !candidate.kind.is_outside()
-                })
+                .filter(|(joint, _)| asked(joint))
                 .map(|(_, thirds)| apart(problem, c, [&thirds[0], &thirds[1]]))
                 .fold(0.0, f64::max);
             let apart = parts
                 .iter()
                 .filter(|parts| {
                     let holds = |(part, _): &(Problem, Fit)| size(part, fit, c) > SHOWS * size(problem, fit, c);
-                    let asked = !OF_THE_MOMENT.contains(&candidate.kind) && !candidate.kind.is_outside();
-                    asked && parts.iter().all(holds) && beyond_noise(c, parts)
+                    parts.iter().all(holds) && beyond_noise(c, parts)
                 })
                 .map(|[(_, slow), (_, fast)]| self::apart(problem, c, [slow, fast]))
                 .fold(apart, f64::max);

@@ -240,8 +240,7 @@ impl Logs<'_> {
     /// Held-out residuals of a set less what laws outside the catalogue in it account for.
     pub(crate) fn beside_outside(&self, problem: &Problem, set: &[usize], rows: &Rows) -> Rows {
         let mut rows = rows.clone();
-        let outside: Vec<usize> =
-            set.iter().copied().filter(|&c| problem.entries[c].candidate.kind.is_outside()).collect();
+        let outside = problem.outside(set);
         if outside.is_empty() {
             return rows;
         }
@@ -271,7 +270,7 @@ impl Logs<'_> {
         beside: verdict::Judged,
     ) -> Option<Resemblance> {
         let mut laws: BTreeMap<Kind, Vec<usize>> = BTreeMap::new();
-        for candidate in set.iter().map(|&c| &problem.entries[c].candidate).filter(|c| c.kind.is_outside()) {
+        for candidate in problem.outside(set).into_iter().map(|c| &problem.entries[c].candidate) {
             laws.entry(candidate.kind).or_default().extend(&candidate.joints);
         }
         let rest = after.unexplained_fraction();
@@ -359,8 +358,7 @@ impl Logs<'_> {
         let size = |rows: &Rows| if chatters { typical(rows) } else { rms(rows) };
         let judged = verdict::Judged { before: size(&before.rows), after: size(&after.rows), floor: floor_of_concern };
         let unexplained = judged.unexplained_fraction();
-        let verdict =
-            judged.verdict(effects.is_empty(), fit.set.iter().any(|&c| problem.entries[c].candidate.kind.is_outside()));
+        let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());
         // What a law outside the catalogue accounts for does not speak against the effects beside it.
         let beside = self.beside_outside(problem, &fit.set, &after.rows);
         let beside = verdict::Judged { after: size(&beside), ..judged };

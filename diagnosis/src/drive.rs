@@ -78,8 +78,7 @@ impl Logs<'_> {
     /// drive; best first.
     pub(crate) fn accounts(&self, problem: &Problem, others: &Fit) -> Result<Vec<Account>, EffectError> {
         let effects = others.effects(problem, self.model);
-        let outside: Vec<usize> =
-            others.set.iter().copied().filter(|&c| problem.entries[c].candidate.kind.is_outside()).collect();
+        let outside = problem.outside(&others.set);
         let runs: Vec<Vec<JointRun>> = self
             .signals
             .par_iter()

@@ -90,9 +90,9 @@ fn per_joint(
             }));
             for runs in &beside {
                 for i in 0..runs[0].len() {
-                    let own = |e: usize| runs[e][i].rows.iter().find(|(row, _)| *row == j).map(|(_, x)| x.clone());
-                    if own(0).is_some() {
-                        base.push(at_rows(&|e| own(e).unwrap_or_default()));
+                    // The same column touches the same joints in every episode.
+                    if let Some(at) = runs[0][i].rows.iter().position(|(row, _)| *row == j) {
+                        base.push(at_rows(&|e| runs[e][i].rows[at].1.clone()));
                     }
                 }
             }

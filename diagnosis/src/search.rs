@@ -48,7 +48,7 @@ const STANDS_IN: [Kind; 9] = [
     Kind::ParallelSpring,
     Kind::GravityMisalignment,
 ];
-/// Part of the effort's variation below which no drive is looked for.
+/// Part of the effort's variation below which neither a drive nor a law outside the catalogue is looked for.
 const UNNOTICED: f64 = 2e-3;
 /// Part of the squared gap that must be left for a drive to be looked for near the noise floor.
 const ALL_BUT: f64 = 1e-3;

@@ -54,11 +54,11 @@ impl Judged {
 
     /// The answer in a word, by whether any effect was found, and whether a law outside the catalogue stands beside them.
     pub fn verdict(&self, no_effects: bool, outside: bool) -> Verdict {
-        match (no_effects, self.leaves_much() || (outside && !no_effects)) {
+        match (no_effects, self.leaves_much()) {
             (true, false) => Verdict::NoGap,
             (true, true) => Verdict::UnknownEffect,
-            (false, false) => Verdict::Explained,
-            (false, true) => Verdict::PartlyExplained,
+            (false, false) if !outside => Verdict::Explained,
+            (false, _) => Verdict::PartlyExplained,
         }
     }
 }

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Golden figures of tests/golden.rs from Pinocchio: one JSON file a robot, beside this script.
+"""Golden figures of tests/all/golden.rs from Pinocchio: one JSON file a robot, beside this script.
 
     python make.py        (needs the PyPI package `pin`)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Golden trajectories of tests/golden.rs from MuJoCo: one JSON file a robot, beside this script.
+"""Golden trajectories of tests/all/golden.rs from MuJoCo: one JSON file a robot, beside this script.
 
     python mujoco_plants.py        (needs the PyPI package `mujoco`)
 

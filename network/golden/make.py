@@ -3,7 +3,7 @@
 
     python make.py            (PyPI: torch, safetensors, numpy)
 
-`tests/weights.rs` loads the files and holds the outputs to 1e-6.
+`tests/all/weights.rs` loads the files and holds the outputs to 1e-6.
 """
 
 import json

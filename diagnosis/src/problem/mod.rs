@@ -236,6 +236,11 @@ impl Problem {
         alignment.into_iter().chain(set.iter().flat_map(|&c| self.entries[c].columns.clone())).collect()
     }
 
+    /// The entries of a set that stand for laws outside the catalogue.
+    pub fn outside(&self, set: &[usize]) -> Vec<usize> {
+        set.iter().copied().filter(|&c| self.entries[c].candidate.kind.is_outside()).collect()
+    }
+
     /// Side of the transmission that a set takes the log to show.
     pub fn side(&self, set: &[usize]) -> EncoderSide {
         let motor = set.iter().any(|&c| self.entries[c].candidate.side == EncoderSide::Motor);

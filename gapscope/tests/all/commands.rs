@@ -1,67 +1,49 @@
 //! `diagnose` and `evaluate` from outside: exit statuses, files that are there already, predictions that give the figures.
 
-use gapscope_datasets::{Recipe, generate, write_csv};
-use gapscope_dynamics::robots;
-use gapscope_effects::{Effect, ViscousFriction};
+use crate::support::{gapscope, pendulum, said};
 use serde_json::Value;
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn gapscope(folder: &Path, arguments: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gapscope")).current_dir(folder).args(arguments.split(' ')).output().unwrap()
-}
+use std::process::Output;
 
 #[track_caller]
 fn ends(output: &Output, status: i32, says: &str) {
-    let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let said = said(output);
     assert_eq!(output.status.code(), Some(status), "{said}");
     assert!(said.contains(says), "no {says:?} in {said}");
 }
 
-/// A double pendulum with viscous friction: its URDF and a log.
-fn prepare(folder: &Path) {
-    let model = robots::model("double_pendulum").unwrap().unwrap().model;
-    let viscous = model.joints().iter().map(|j| (j.name.clone(), 0.2)).collect();
-    let effect = Effect::ViscousFriction(ViscousFriction { viscous });
-    let recipe = Recipe { seconds: 12.0, rate: 200.0, ..Recipe::default() };
-    let log = generate(&model, &[effect], 3, &recipe, "log.csv").unwrap();
-    write_csv(folder.join("log.csv"), &log, true).unwrap();
-    std::fs::write(folder.join("robot.urdf"), robots::double_pendulum()).unwrap();
-}
-
 #[test]
 fn bad_input_ends_with_1_and_wrong_usage_with_2() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = pendulum();
     let folder = dir.path();
-    prepare(folder);
-    ends(&gapscope(folder, "diagnose robot.urdf none.csv"), 1, "none.csv");
-    ends(&gapscope(folder, "diagnose log.csv log.csv"), 1, "log.csv");
-    ends(&gapscope(folder, "diagnose robot.urdf robot.urdf"), 1, "robot.urdf");
-    ends(&gapscope(folder, "evaluate robot.urdf log.csv --with robot.urdf"), 1, "robot.urdf");
-    ends(&gapscope(folder, "diagnose"), 2, "Usage");
-    ends(&gapscope(folder, "diagnose robot.urdf log.csv --no-such-flag"), 2, "--no-such-flag");
+    let gapscope = |arguments: &str| gapscope(folder, arguments.split(' '));
+    ends(&gapscope("diagnose robot.urdf none.csv"), 1, "none.csv");
+    ends(&gapscope("diagnose log.csv log.csv"), 1, "log.csv");
+    ends(&gapscope("diagnose robot.urdf robot.urdf"), 1, "robot.urdf");
+    ends(&gapscope("evaluate robot.urdf log.csv --with robot.urdf"), 1, "robot.urdf");
+    ends(&gapscope("diagnose"), 2, "Usage");
+    ends(&gapscope("diagnose robot.urdf log.csv --no-such-flag"), 2, "--no-such-flag");
     let entries = std::fs::read_dir(folder).unwrap().count();
     assert_eq!(entries, 2, "what fails leaves nothing behind");
 }
 
 #[test]
 fn a_result_is_kept_unless_forced_and_predictions_give_the_figures() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = pendulum();
     let folder = dir.path();
-    prepare(folder);
-    ends(&gapscope(folder, "diagnose robot.urdf log.csv --out found"), 0, "Viscous");
+    let gapscope = |arguments: &str| gapscope(folder, arguments.split(' '));
+    ends(&gapscope("diagnose robot.urdf log.csv --out found"), 0, "Viscous");
     let diagnosis = folder.join("found/diagnosis.json");
     std::fs::write(&diagnosis, "mine").unwrap();
-    ends(&gapscope(folder, "diagnose robot.urdf log.csv --out found"), 1, "--force");
+    ends(&gapscope("diagnose robot.urdf log.csv --out found"), 1, "--force");
     assert_eq!(std::fs::read_to_string(&diagnosis).unwrap(), "mine");
-    ends(&gapscope(folder, "diagnose robot.urdf log.csv --out found --force"), 0, "Viscous");
+    ends(&gapscope("diagnose robot.urdf log.csv --out found --force"), 0, "Viscous");
     assert!(std::fs::read_to_string(&diagnosis).unwrap().contains("gapscope.diagnosis/1"));
 
     let evaluate = "evaluate robot.urdf log.csv --json --with found/corrected.json --predictions torque.csv";
     std::fs::write(folder.join("torque.csv"), "mine").unwrap();
-    ends(&gapscope(folder, evaluate), 1, "--force");
+    ends(&gapscope(evaluate), 1, "--force");
     assert_eq!(std::fs::read_to_string(folder.join("torque.csv")).unwrap(), "mine");
-    let output = gapscope(folder, &format!("{evaluate} --force"));
+    let output = gapscope(&format!("{evaluate} --force"));
     ends(&output, 0, "gapscope.evaluation/1");
     let evaluation: Value = serde_json::from_slice(&output.stdout).unwrap();
 

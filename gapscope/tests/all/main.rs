@@ -3,5 +3,6 @@
 
 mod commands;
 mod rollout;
+mod support;
 mod train;
 mod withheld;

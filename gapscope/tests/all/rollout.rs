@@ -1,41 +1,23 @@
 //! `gapscope rollout` with networks that `gapscope train` wrote.
 
-use gapscope_datasets::{Recipe, generate, write_csv};
-use gapscope_dynamics::robots;
-use gapscope_effects::{Effect, ViscousFriction};
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn gapscope(folder: &Path, arguments: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gapscope")).current_dir(folder).args(arguments.split(' ')).output().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
-}
+use crate::support::{gapscope, pendulum, said};
 
 #[test]
 fn networks_stand_beside_the_nominal_model_and_what_does_not_fit_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = pendulum();
     let folder = dir.path();
-    let model = robots::model("double_pendulum").unwrap().unwrap().model;
-    let viscous = model.joints().iter().map(|j| (j.name.clone(), 0.2)).collect();
-    let effect = Effect::ViscousFriction(ViscousFriction { viscous });
-    let recipe = Recipe { seconds: 12.0, rate: 200.0, ..Recipe::default() };
-    let log = generate(&model, &[effect], 3, &recipe, "log.csv").unwrap();
-    write_csv(folder.join("log.csv"), &log, true).unwrap();
-    std::fs::write(folder.join("robot.urdf"), robots::double_pendulum()).unwrap();
+    let gapscope = |arguments: &str| gapscope(folder, arguments.split(' '));
     let network = "robot.urdf log.csv --hidden 16 --epochs 60 --rate 0.01 --cosine --out";
     for arguments in
         [format!("train residual {network} residual --on acceleration"), format!("train pure {network} pure")]
     {
-        let output = gapscope(folder, &arguments);
+        let output = gapscope(&arguments);
         assert!(output.status.success(), "{}", said(&output));
     }
 
     let rollout = |more: &str| {
         let arguments = format!("rollout robot.urdf log.csv --horizon 0.3 --starts 30 --out page.html --force {more}");
-        gapscope(folder, &arguments)
+        gapscope(&arguments)
     };
     let output = rollout("--residual residual --pure pure/weights.json");
     let text = said(&output);

@@ -1,34 +1,13 @@
 //! `gapscope train`: from logs to weights that load again; bad input and wrong usage.
 
-use gapscope_datasets::{Recipe, generate, write_csv};
-use gapscope_dynamics::robots;
-use gapscope_effects::{Effect, ViscousFriction};
+use crate::support::{gapscope, pendulum};
 use gapscope_network::{Mlp, from_json, from_safetensors};
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn gapscope(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gapscope")).current_dir(folder).args(arguments).output().unwrap()
-}
-
-/// A folder with the robot and a log of 12 s of it, with friction that its URDF lacks.
-fn folder() -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    let model = robots::model("double_pendulum").unwrap().unwrap().model;
-    let viscous = model.joints().iter().map(|j| (j.name.clone(), 0.2)).collect();
-    let effect = Effect::ViscousFriction(ViscousFriction { viscous });
-    let recipe = Recipe { seconds: 12.0, rate: 200.0, ..Recipe::default() };
-    let log = generate(&model, &[effect], 3, &recipe, "log.csv").unwrap();
-    write_csv(dir.path().join("log.csv"), &log, true).unwrap();
-    std::fs::write(dir.path().join("robot.urdf"), robots::double_pendulum()).unwrap();
-    dir
-}
 
 const SMALL: [&str; 9] = ["--hidden", "16", "--epochs", "20", "--rate", "0.01", "--cosine", "--out", "trained"];
 
 #[test]
 fn weights_curve_and_record_come_out_and_are_not_overwritten() {
-    let dir = folder();
+    let dir = pendulum();
     let run = |kind: &str, more: &[&str]| {
         let arguments = [&["train", kind, "robot.urdf", "log.csv"], &SMALL[..], more].concat();
         gapscope(dir.path(), &arguments)
@@ -60,7 +39,7 @@ fn weights_curve_and_record_come_out_and_are_not_overwritten() {
 
 #[test]
 fn bad_input_and_wrong_usage_are_told_apart() {
-    let dir = folder();
+    let dir = pendulum();
     for (arguments, code, text) in [
         (&["train", "pure", "robot.urdf", "log.csv", "--on", "torque"][..], 1, "--on"),
         (&["train", "residual", "robot.urdf", "log.csv", "--reference", "large"], 1, "two-hidden-128"),

@@ -107,10 +107,10 @@ fn in_panels<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usiz
             for from in (0..inputs).step_by(DEEP) {
                 let deep = DEEP.min(inputs - from);
                 // What stands behind the last output is nobody's: it is computed and not kept.
-                for (panel, weights) in panel.0.iter_mut().zip(weights[from * outputs..].chunks_exact(outputs)) {
-                    copy(panel, &weights[first..], wide);
+                let panel = &mut panel.0[..deep];
+                for k in 0..deep {
+                    copy(&mut panel[k], &weights[(from + k) * outputs + first..], wide);
                 }
-                let panel = &panel.0[..deep];
                 let bias = (from == 0).then_some(&bias[first..first + wide]);
                 let rows = y.len() / outputs;
                 let mut row = 0;

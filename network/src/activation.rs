@@ -7,7 +7,7 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Activation {
-    /// tanh z; within 2.5 ε of the true value (relative), see `layer.rs`.
+    /// tanh z; within 4 ε of the true value (relative), see `layer.rs`.
     #[default]
     Tanh,
     /// max(0, z).

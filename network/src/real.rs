@@ -45,26 +45,16 @@ pub(crate) mod sealed {
         const DTYPE: safetensors::Dtype;
         /// ONNX's number of the type (`TensorProto.DataType`).
         const ONNX: u64;
-        /// 1.5 · 2^m with m mantissa bits: adding it rounds to a whole number that sits in the lowest bits.
-        const ROUND: Self;
-        /// log₂ e.
-        const LOG2_E: Self;
-        /// ln 2, upper bits: a small whole number times it is exact.
-        const LN_2_HIGH: Self;
-        /// ln 2 − upper bits.
-        const LN_2_LOW: Self;
-        /// Beyond 2x = this, tanh x rounds to one.
-        const SATURATED: Self;
-        /// 1/2!, 1/3!, … as far as exp(r) − 1 needs for |r| ≤ ln 2 / 2.
-        const TAYLOR: &'static [Self];
+        /// P of tanh x ≈ x P(x²) / Q(x²), the constant first: minimax (Lawson's iteration) for the relative error where
+        /// x² ≤ [`Vector::FLAT`], 2.1e-8 for `f32` and 4.1e-18 for `f64`, and then the neighbours, a few units in the
+        /// last place away, whose rounded arithmetic errs least.
+        const NUMERATOR: &'static [Self];
+        /// Q of the same.
+        const DENOMINATOR: &'static [Self];
+        /// x² beyond which tanh x rounds to one.
+        const FLAT: Self;
         /// self · b + c, rounded once.
         fn fused(self, b: Self, c: Self) -> Self;
-        /// 2^k for k + [`Vector::ROUND`].
-        fn power_of_two(rounded: Self) -> Self;
-        /// |self|.
-        fn magnitude(self) -> Self;
-        /// |self| with the sign of `sign`.
-        fn with_sign(self, sign: Self) -> Self;
         /// √self.
         fn root(self) -> Self;
         /// Adds the little-endian bytes to `out`.
@@ -75,7 +65,7 @@ pub(crate) mod sealed {
 }
 
 macro_rules! real {
-    ($t:ident, $bits:ident, $bytes:literal, $dtype:ident, $onnx:literal, $mantissa:literal, $bias:literal, $saturated:literal, $high:literal, $low:literal, $taylor:expr) => {
+    ($t:ident, $bytes:literal, $dtype:ident, $onnx:literal, $numerator:expr, $denominator:expr, $flat:literal) => {
         impl Real for $t {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -91,28 +81,12 @@ macro_rules! real {
             const BYTES: usize = $bytes;
             const DTYPE: safetensors::Dtype = safetensors::Dtype::$dtype;
             const ONNX: u64 = $onnx;
-            const ROUND: Self = 1.5 * (1u64 << $mantissa) as $t;
-            const LOG2_E: Self = std::$t::consts::LOG2_E;
-            const LN_2_HIGH: Self = $high;
-            const LN_2_LOW: Self = $low;
-            const SATURATED: Self = $saturated;
-            const TAYLOR: &'static [Self] = $taylor;
+            const NUMERATOR: &'static [Self] = &$numerator;
+            const DENOMINATOR: &'static [Self] = &$denominator;
+            const FLAT: Self = $flat;
             #[inline(always)]
             fn fused(self, b: Self, c: Self) -> Self {
                 self.mul_add(b, c)
-            }
-            #[inline(always)]
-            fn power_of_two(rounded: Self) -> Self {
-                // The bits of ROUND above the whole number leave at the top.
-                Self::from_bits(rounded.to_bits().wrapping_add($bias) << $mantissa)
-            }
-            #[inline(always)]
-            fn magnitude(self) -> Self {
-                self.abs()
-            }
-            #[inline(always)]
-            fn with_sign(self, sign: Self) -> Self {
-                self.copysign(sign)
             }
             #[inline(always)]
             fn root(self) -> Self {
@@ -130,27 +104,44 @@ macro_rules! real {
     };
 }
 
-/// 1/2!, 1/3!, …, 1/13!.
-const TAYLOR_64: &[f64] = &{
-    let (mut out, mut factorial, mut i) = ([0.0; 12], 1.0, 0);
-    while i < 12 {
-        factorial *= (i + 2) as f64;
-        out[i] = 1.0 / factorial;
-        i += 1;
-    }
-    out
-};
-
-/// 1/2!, …, 1/7!.
-const TAYLOR_32: &[f32] = &{
-    let (mut out, mut i) = ([0.0; 6], 0);
-    while i < 6 {
-        out[i] = TAYLOR_64[i] as f32;
-        i += 1;
-    }
-    out
-};
-
-// ln 2 in two parts, the upper one with 16 (f32) and 33 (f64) significant bits.
-real!(f32, u32, 4, F32, 1, 23, 127, 20.0, 0.693_145_75, 1.428_606_8e-6, TAYLOR_32);
-real!(f64, u64, 8, F64, 11, 52, 1023, 40.0, 0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10, TAYLOR_64);
+real!(
+    f32,
+    4,
+    F32,
+    1,
+    [1.0, 0.133_797_2, 3.494_037_3e-3, 2.058_355e-5, 1.331_918_1e-8],
+    [1.0, 0.467_130_36, 2.587_108_1e-2, 3.283_098_6e-4, 7.762_060_4e-7],
+    81.36
+);
+real!(
+    f64,
+    8,
+    F64,
+    11,
+    [
+        1.0,
+        0.152_556_753_314_329_94,
+        6.087_782_631_198_269e-3,
+        9.794_366_963_809_3e-5,
+        7.478_020_865_596_488e-7,
+        2.874_376_322_600_921_7e-9,
+        5.515_425_551_054_414e-12,
+        4.874_412_566_927_606e-15,
+        1.608_854_532_446_299_7e-18,
+        9.972_658_434_823_982e-23,
+        -2.640_192_364_681_924_5e-27,
+    ],
+    [
+        1.0,
+        0.485_890_086_647_663_26,
+        3.471_781_151_375_281e-2,
+        8.534_565_894_544_485e-4,
+        9.342_857_440_549_606e-6,
+        5.046_738_839_820_100_4e-8,
+        1.377_533_197_066_16e-10,
+        1.822_395_411_741_721_2e-13,
+        1.024_142_308_874_349_5e-16,
+        1.723_409_749_325_001_5e-20,
+    ],
+    364.81
+);

@@ -104,25 +104,26 @@ fn in_panels<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usiz
     for (x, y) in x.chunks(ROWS * inputs).zip(y.chunks_mut(ROWS * outputs)) {
         for first in (0..outputs).step_by(WIDE) {
             let wide = WIDE.min(outputs - first);
+            let start: [T; WIDE] = leading(&bias[first..]);
             for from in (0..inputs).step_by(DEEP) {
                 let deep = DEEP.min(inputs - from);
                 // What stands behind the last output is nobody's: it is computed and not kept.
                 let panel = &mut panel.0[..deep];
                 for k in 0..deep {
-                    copy(&mut panel[k], &weights[(from + k) * outputs + first..], wide);
+                    panel[k] = leading(&weights[(from + k) * outputs + first..]);
                 }
-                let bias = (from == 0).then_some(&bias[first..first + wide]);
+                let start = (from == 0).then_some(&start);
                 let rows = y.len() / outputs;
                 let mut row = 0;
                 while row < rows {
                     let (x, y) = (&x[row * inputs + from..], &mut y[row * outputs + first..]);
                     row += match rows - row {
                         left if left >= TALL => {
-                            tile::<T, REGISTER, WIDE, TALL>(panel, bias, x, inputs, y, outputs, wide)
+                            tile::<T, REGISTER, WIDE, TALL>(panel, start, x, inputs, y, outputs, wide)
                         }
-                        4.. => tile::<T, REGISTER, WIDE, 4>(panel, bias, x, inputs, y, outputs, wide),
-                        2.. => tile::<T, REGISTER, WIDE, 2>(panel, bias, x, inputs, y, outputs, wide),
-                        _ => tile::<T, REGISTER, WIDE, 1>(panel, bias, x, inputs, y, outputs, wide),
+                        4.. => tile::<T, REGISTER, WIDE, 4>(panel, start, x, inputs, y, outputs, wide),
+                        2.. => tile::<T, REGISTER, WIDE, 2>(panel, start, x, inputs, y, outputs, wide),
+                        _ => tile::<T, REGISTER, WIDE, 1>(panel, start, x, inputs, y, outputs, wide),
                     };
                 }
             }
@@ -132,11 +133,11 @@ fn in_panels<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usiz
 }
 
 /// Adds a panel's product with R rows of x, each `inputs` behind the one before, to `wide` outputs of as many rows of y, or
-/// to the bias where there is one; R.
+/// to `start` where there is one; R.
 #[inline(always)]
 fn tile<T: Real, const REGISTER: usize, const WIDE: usize, const R: usize>(
     panel: &[[T; WIDE]],
-    bias: Option<&[T]>,
+    start: Option<&[T; WIDE]>,
     x: &[T],
     inputs: usize,
     y: &mut [T],
@@ -144,10 +145,10 @@ fn tile<T: Real, const REGISTER: usize, const WIDE: usize, const R: usize>(
     wide: usize,
 ) -> usize {
     assert!(x.len() >= (R - 1) * inputs + panel.len() && wide <= WIDE);
-    let mut sum = [[T::ZERO; WIDE]; R];
-    for r in 0..R {
-        copy(&mut sum[r], bias.unwrap_or(&y[r * outputs..]), wide);
-    }
+    let mut sum: [[T; WIDE]; R] = match start {
+        Some(start) => [*start; R],
+        None => std::array::from_fn(|r| leading(&y[r * outputs..])),
+    };
     for (k, weights) in panel.iter().enumerate() {
         for r in 0..R {
             // SAFETY: r < R and k < panel.len(); the length was checked above. Checks in here cost registers: with them the
@@ -167,13 +168,22 @@ fn tile<T: Real, const REGISTER: usize, const WIDE: usize, const R: usize>(
     R
 }
 
-/// The first `wide` of N numbers, the others left as they are or overwritten: without a call where there are N.
+/// The first N numbers, zero where there are none.
 #[inline(always)]
-fn copy<T: Real, const N: usize>(to: &mut [T; N], from: &[T], wide: usize) {
-    match from.first_chunk::<N>() {
-        Some(from) => *to = *from,
-        None => to[..wide].copy_from_slice(&from[..wide]),
+fn leading<T: Real, const N: usize>(from: &[T]) -> [T; N] {
+    match from.first_chunk() {
+        Some(first) => *first,
+        None => padded(from),
     }
+}
+
+/// Apart, so that the common case of [`leading`] is loads and stores: in one function the two copies become one call.
+#[cold]
+#[inline(never)]
+fn padded<T: Real, const N: usize>(from: &[T]) -> [T; N] {
+    let mut out = [T::ZERO; N];
+    out[..from.len()].copy_from_slice(from);
+    out
 }
 
 /// W x + b of one row: its outputs in as many registers as there are, the weights as they are stored.

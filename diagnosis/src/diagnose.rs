@@ -351,11 +351,14 @@ impl Logs<'_> {
         let pushes = effects.iter().any(|e| e.kind() == Kind::ExternalContact);
         let counts = |i: usize| !pushes || calm(i);
         let concern = gap::weights_of_concern(model, &self.signals, &self.moving);
-        let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, counts)), &concern);
+        // An impact a moment early or late is no fault of the play that makes it.
+        let mut chatters = vec![false; model.dof()];
+        for &c in &fit.set {
+            let candidate = &problem.entries[c].candidate;
+            candidate.joints.iter().for_each(|&j| chatters[j] |= candidate.kind == Kind::Backlash);
+        }
+        let size = |rows: &Rows| gap::calm(&gap::squares(&self.band, rows, counts), &concern, &chatters);
         let floor_of_concern = gap::weighted_floor(&floor, &concern);
-        let typical = |rows: &Rows| gap::typical(&gap::squares(&self.band, rows, counts), &concern);
-        let chatters = effects.iter().any(|e| e.kind() == Kind::Backlash);
-        let size = |rows: &Rows| if chatters { typical(rows) } else { rms(rows) };
         let judged = verdict::Judged { before: size(&before.rows), after: size(&after.rows), floor: floor_of_concern };
         let unexplained = judged.unexplained_fraction();
         let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());

@@ -23,9 +23,13 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 /// Resonances of the link on its locked motor that are tried first, Hz.
-const RESONANCE: [f64; 4] = [2.2, 3.6, 6.0, 10.0];
-/// Gaps that are tried first, rad or m.
-const GAP: [f64; 5] = [0.004, 0.009, 0.018, 0.035, 0.07];
+const RESONANCE: [f64; 6] = [2.0, 3.0, 4.5, 6.5, 9.0, 13.0];
+/// Gaps that are tried first, rad or m: the basin of the true one is narrow.
+const GAP: [f64; 10] = [0.003, 0.0045, 0.0065, 0.0095, 0.013, 0.018, 0.025, 0.035, 0.05, 0.07];
+/// Rotors that are tried first with each, as parts of the inertia that they turn.
+const ROTOR: [f64; 7] = [0.1, 0.2, 0.33, 0.5, 0.7, 1.0, 1.4];
+/// The best so many of these pairs go on.
+const FIRST: usize = 3;
 /// Steps of the search for the best knob and rotor, relative: the first, and where it ends.
 const STEPS: (f64, f64) = (0.2, 0.004);
 /// Moves of that search, at most.
@@ -33,9 +37,9 @@ const MOVES: usize = 40;
 /// Gauss–Newton steps from each first try, and the farthest that one goes, relative.
 const DESCENTS: usize = 3;
 const FARTHEST: f64 = 0.5;
-/// A drive is not rigid where an account of it leaves less in so many more blocks of time that tell, over their root (the
-/// sign test: a burst of chatter is one block), ...
-const BEYOND_DOUBT: f64 = 1.5;
+/// A drive is not rigid where over the blocks of time that tell, the logarithm of what an account of it leaves is less by so
+/// many standard errors (a burst of chatter is one block, and counts no more than its logarithm), ...
+const BEYOND_DOUBT: f64 = 1.0;
 /// ... and this part of the mean square, or less.
 const PART: f64 = 0.85;
 /// Part of the noise, and of the effort, below which what is left of a block of time is as good as nothing.
@@ -55,7 +59,7 @@ const SEED: u64 = 5;
 pub(crate) struct Account {
     /// Spring or play at the knob found.
     pub drive: Candidate,
-    /// By how many standard errors of the sign test it is better.
+    /// By how many standard errors it is better.
     pub beyond: f64,
 }
 
@@ -74,9 +78,14 @@ struct Study<'a> {
 }
 
 impl Logs<'_> {
-    /// The best account of each joint's drive that is better than a rigid one, beside other effects, none of them such a
-    /// drive; best first.
-    pub(crate) fn accounts(&self, problem: &Problem, others: &Fit) -> Result<Vec<Account>, EffectError> {
+    /// The best account of the drive of each of some joints that is better than a rigid one, beside other effects, none of
+    /// them such a drive; best first.
+    pub(crate) fn accounts(
+        &self,
+        joints: &[usize],
+        problem: &Problem,
+        others: &Fit,
+    ) -> Result<Vec<Account>, EffectError> {
         let effects = others.effects(problem, self.model);
         let outside = problem.outside(&others.set);
         let runs: Vec<Vec<JointRun>> = self
@@ -98,9 +107,7 @@ impl Logs<'_> {
                 Ok(runs)
             })
             .collect::<Result<_, EffectError>>()?;
-        let moving: Vec<usize> = (0..self.model.dof()).filter(|&j| self.moving[j]).collect();
-        let mut found: Vec<Account> =
-            moving.into_par_iter().filter_map(|j| Study::new(self, &runs, j).best()).collect();
+        let mut found: Vec<Account> = joints.par_iter().filter_map(|&j| Study::new(self, &runs, j).best()).collect();
         found.sort_by(|a, b| b.beyond.total_cmp(&a.beyond));
         Ok(found)
     }
@@ -146,20 +153,32 @@ impl<'a> Study<'a> {
             return None;
         }
         let rigid_measure = self.measure(&rigid, rigid_rotor);
+        let rest = self.rows(&rigid, rigid_rotor);
+        let left_of = |e: usize| mean_square(&rest[self.logs.band.of_episode[e].clone()]);
+        let episode = (0..self.runs.len()).max_by(|&a, &b| left_of(a).total_cmp(&left_of(b))).unwrap_or(0);
         let mut best: Option<(f64, Candidate, f64)> = None;
         for side in [EncoderSide::Link, EncoderSide::Motor] {
             for (kind, grid) in [(Kind::JointElasticity, &RESONANCE[..]), (Kind::Backlash, &GAP)] {
-                let at = |shape: f64| Candidate {
+                let at = &|shape: f64| Candidate {
                     shape,
                     side,
                     inertia: self.inertia,
                     ..Candidate::new(kind, vec![self.joint])
                 };
-                let first = grid
+                let measured = |(drive, rotor): (Candidate, f64)| (self.measure(&drive, rotor), drive, rotor);
+                // Where most of the time is spent in the gap, the rotor of a rigid drive is far off.
+                let rotors = || ROTOR.iter().map(|part| part * self.inertia).chain([rigid_rotor]);
+                let mut tried: Vec<(f64, Candidate, f64)> = grid
                     .iter()
-                    .map(|&shape| self.descend(at(shape), self.rotor(&at(shape), rigid_rotor)))
-                    .map(|(drive, rotor)| (self.measure(&drive, rotor), drive, rotor))
-                    .min_by(|a, b| a.0.total_cmp(&b.0));
+                    .flat_map(|&shape| rotors().map(move |rotor| (at(shape), rotor)))
+                    .map(|(drive, rotor)| (self.first_measure(episode, &drive, rotor), drive, rotor))
+                    .collect();
+                tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+                tried.truncate(FIRST);
+                let descended: Vec<(Candidate, f64)> =
+                    tried.iter().map(|(_, drive, rotor)| self.descend(drive.clone(), *rotor)).collect();
+                let tried = tried.into_iter().map(|(_, drive, rotor)| (drive, rotor)).chain(descended).map(measured);
+                let first = tried.min_by(|a, b| a.0.total_cmp(&b.0));
                 let Some((_, first, rotor)) = first.filter(|(least, ..)| *least < rigid_measure) else { continue };
                 let (drive, rotor) = self.turn(first, rotor);
                 let measure = self.measure(&drive, rotor);
@@ -171,10 +190,13 @@ impl<'a> Study<'a> {
         let (_, drive, rotor) = best?;
         let with = self.left(&drive, rotor);
         let gain = mean(&without.iter().zip(&with).map(|(r, d)| (r / d).ln()).collect::<Vec<_>>());
-        let telling: Vec<(f64, f64)> =
-            without.iter().copied().zip(with.iter().copied()).filter(|(r, d)| r.max(*d) > 2.0 * self.nothing).collect();
-        let better: f64 = telling.iter().map(|(r, d)| if r > d { 1.0 } else { -1.0 }).sum();
-        let beyond = better / (telling.len().max(1) as f64).sqrt();
+        let telling: Vec<f64> = without
+            .iter()
+            .zip(&with)
+            .filter(|(r, d)| r.max(**d) > 2.0 * self.nothing)
+            .map(|(r, d)| (r / d).ln())
+            .collect();
+        let beyond = telling.iter().sum::<f64>() / mean_square(&telling).sqrt() / (telling.len().max(1) as f64).sqrt();
         // At the edge of what a drive can be, it stands in for something else.
         let possible = rotor > 1.1 * LIGHTEST * self.inertia
             && (drive.kind != Kind::JointElasticity || (SOFTEST..STIFFEST).contains(&drive.shape));
@@ -264,22 +286,29 @@ impl<'a> Study<'a> {
 
     /// Mean logarithm of what is left of the blocks: a burst of chatter counts as one block that is off.
     fn measure(&self, drive: &Candidate, rotor: f64) -> f64 {
-        let left: Vec<f64> = self.left(drive, rotor).into_iter().map(f64::ln).collect();
-        let mean = mean(&left);
-        if mean.is_finite() { mean } else { f64::INFINITY }
+        mean_logarithm(self.left(drive, rotor))
+    }
+
+    /// A first look at the same: of one episode alone, and with a rigid drive's noise.
+    fn first_measure(&self, episode: usize, drive: &Candidate, rotor: f64) -> f64 {
+        let mut rows = vec![0.0; self.logs.band.rows.len()];
+        let rest = self.logs.band.filter(episode, &self.runs[episode].left_by(drive, rotor));
+        rows[self.logs.band.of_episode[episode].clone()].copy_from_slice(&rest);
+        mean_logarithm(self.beyond(rows, &self.noise))
     }
 
     /// Mean square of each block that a drive leaves beyond noise and nothing, (N m)².
     fn left(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
         let rest = self.rows(drive, rotor);
         let noise = self.noise(drive, rotor, &rest);
-        self.mean_squares(rest)
-            .into_iter()
-            .zip(noise)
-            .zip(&self.noise)
-            // Play is so sensitive that noise might account for all of it: no more is taken off than of a rigid drive.
-            .map(|((left, noise), rigid)| (left - noise.min(*rigid)).max(0.0) + self.nothing)
-            .collect()
+        // Play is so sensitive that noise might account for all of it: no more is taken off than of a rigid drive.
+        let noise: Vec<f64> = noise.iter().zip(&self.noise).map(|(noise, rigid)| noise.min(*rigid)).collect();
+        self.beyond(rest, &noise)
+    }
+
+    fn beyond(&self, rest: Vec<f64>, noise: &[f64]) -> Vec<f64> {
+        let left = self.mean_squares(rest).into_iter().zip(noise);
+        left.map(|(left, noise)| (left - noise).max(0.0) + self.nothing).collect()
     }
 
     /// Mean square of what more noise changes of a rest, in each block, (N m)².
@@ -338,6 +367,11 @@ fn noisier(s: &Signals, run: &JointRun, position: f64, effort: f64, seed: u64) -
 
 fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len().max(1) as f64
+}
+
+fn mean_logarithm(x: Vec<f64>) -> f64 {
+    let mean = mean(&x.into_iter().map(f64::ln).collect::<Vec<_>>());
+    if mean.is_finite() { mean } else { f64::INFINITY }
 }
 
 fn mean_square(x: &[f64]) -> f64 {

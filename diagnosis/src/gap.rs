@@ -63,16 +63,21 @@ pub fn squares(band: &Band, rows: &Rows, keep: impl Fn(usize) -> bool) -> Vec<Ve
     sums
 }
 
-/// Weighted root mean square of the block in the middle: deaf to the few blocks in which something jolts.
-pub fn typical(blocks: &[Vec<f64>], weights: &[f64]) -> f64 {
-    let mut each: Vec<f64> = blocks.iter().map(|block| weighted_rms(block, weights)).collect();
-    each.sort_by(f64::total_cmp);
-    each.get(each.len() / 2).copied().unwrap_or(0.0)
+/// Weighted root mean square, of some joints that of the block in the middle: deaf to the few blocks in which they jolt.
+pub fn calm(blocks: &[Vec<f64>], weights: &[f64], jolting: &[bool]) -> f64 {
+    let mut sums = total(blocks);
+    let count = sums.last().copied().unwrap_or(0.0);
+    for j in (0..weights.len()).filter(|&j| jolting[j] && !blocks.is_empty()) {
+        let mut each: Vec<f64> = blocks.iter().map(|block| block[j] / block[weights.len()]).collect();
+        each.sort_by(f64::total_cmp);
+        sums[j] = each[each.len() / 2] * count;
+    }
+    weighted_rms(&sums, weights)
 }
 
-/// Weighted root mean square as the geometric mean over blocks.
-pub fn mean_level(blocks: &[Vec<f64>], weights: &[f64]) -> f64 {
-    let sum: f64 = blocks.iter().map(|block| weighted_rms(block, weights).max(f64::MIN_POSITIVE).ln()).sum();
+/// Weighted root mean square as the geometric mean over blocks, each at least `nothing`.
+pub fn mean_level(blocks: &[Vec<f64>], weights: &[f64], nothing: f64) -> f64 {
+    let sum: f64 = blocks.iter().map(|block| weighted_rms(block, weights).hypot(nothing).ln()).sum();
     (sum / blocks.len().max(1) as f64).exp()
 }
 

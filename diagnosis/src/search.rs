@@ -29,6 +29,8 @@ const OF_FLOOR: f64 = 3.0;
 /// ... or what is nobody's concern, as a part of the effort's variation. A resonance of its own takes half of anything that
 /// sways.
 const OF_EFFORT: f64 = 0.01;
+/// Part of the effort's variation that counts as nothing in a block of time: play may show in few blocks.
+const NOTHING: f64 = 1e-3;
 /// Another account of a drive is better where it leaves this part of the gap.
 const BETTER: f64 = 0.95;
 /// Times that the choice is made, each around the exact parameters of the one before.
@@ -100,9 +102,10 @@ impl Logs<'_> {
     ///
     /// What the normal equations promise is held against the torque that the plant really predicts on held-out data. Where
     /// many kinds stand together or leave much, flexible laws may have bent to what none of them is: then the linear kinds
-    /// alone have their turn, and stay if they predict as well with no more of them. Where more than noise is left, laws
-    /// outside the catalogue compete, so that effects are chosen beside what they do not explain instead of bent to it. A set
-    /// that makes the gap larger is no explanation: then the next choice does without the kinds that promise most.
+    /// alone have their turn, and where they predict as well with no more of them, so has the set without each of its kinds.
+    /// Where more than noise is left, laws outside the catalogue compete, so that effects are chosen beside what they do not
+    /// explain instead of bent to it; then drives are looked for, and beside a drive those laws once more. A set that makes
+    /// the gap larger is no explanation: then the next choice does without the kinds that promise most.
     pub(crate) fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
         let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, |_| true)), &weights);
@@ -124,28 +127,54 @@ impl Logs<'_> {
         if bends && (best.kinds.len() >= MANY || judged(&best).leaves_much()) {
             let linear = without(&flexible)?;
             if linear.left <= best.left && linear.kinds.len() <= best.kinds.len() {
-                best = linear;
+                // One kind may have spoilt the others: each in turn does without.
+                let level = |tried: &Tried| tried.left * (1.0 + A_KIND * tried.kinds.len() as f64);
+                for kind in std::mem::replace(&mut best, linear).kinds {
+                    let rest = without(&[kind])?;
+                    if level(&rest) < level(&best) {
+                        best = rest;
+                    }
+                }
             }
         }
+        let beyond = |tried: &Tried| (tried.left.powi(2) - floor.powi(2)).max(0.0).sqrt();
         let mut open = None;
+        let mut laws = None;
         if judged(&best).leaves_any() && best.left > UNNOTICED {
-            let beyond = |tried: &Tried| (tried.left.powi(2) - floor.powi(2)).max(0.0).sqrt();
-            let part = OPEN * beyond(&best);
-            open = Some(tried(self.choose_among(&[], progress)?)?).filter(|open| beyond(open) < part);
+            let found = tried(self.choose_among(&[], progress)?)?;
+            laws = Some(found.chosen.all.clone());
+            open = Some(found).filter(|open| beyond(open) < OPEN * beyond(&best));
         }
         let much = judged(&best).leaves_much();
-        let drives = |tried: &Tried| {
+        // Joints whose drive is worth a look: all where anything is left, and else those whose rotor was found, which is a
+        // part of such a drive.
+        let drives = |tried: &Tried| -> Vec<usize> {
             let stands_in = tried.kinds.iter().any(|kind| STANDS_IN.contains(kind));
             let explained_otherwise = stands_in && judged(tried).unexplained_fraction() > ALL_BUT;
-            tried.left > UNNOTICED && (judged(tried).leaves_any() || explained_otherwise)
+            let all = tried.left > UNNOTICED && (judged(tried).leaves_any() || explained_otherwise);
+            let rotors = tried.chosen.exact.entries.iter().filter(|e| e.candidate.kind == Kind::Armature);
+            let rotors: Vec<usize> = rotors.flat_map(|e| e.candidate.joints.iter().copied()).collect();
+            (0..self.model.dof()).filter(|j| self.moving[*j] && (all || rotors.contains(j))).collect()
         };
-        if drives(&best) && open.as_ref().is_none_or(|open| judged(open).leaves_any()) {
-            best = tried(self.drive(best.chosen, progress)?)?;
+        if open.as_ref().is_none_or(|open| judged(open).leaves_any()) {
+            let joints = drives(&best);
+            best = tried(self.drive(best.chosen, &joints, progress)?)?;
         }
-        if let Some(mut open) = open.filter(|open| open.left < best.left) {
-            if drives(&open) {
-                open = tried(self.drive(open.chosen, progress)?)?;
-            }
+        if let Some(found) = open.take_if(|open| open.left < best.left) {
+            let joints = drives(&found);
+            open = Some(tried(self.drive(found.chosen, &joints, progress)?)?);
+        }
+        // What such a drive covered has its turn beside it.
+        if let (Some(laws), Some(turned)) = (laws, &best.chosen.turned)
+            && judged(&best).leaves_any()
+            && best.left > UNNOTICED
+            && let Some(beside) = self.beside(&best.chosen, turned, laws, progress)?
+        {
+            let beside = tried(beside)?;
+            let least = open.as_ref().map_or(f64::INFINITY, beyond).min(OPEN * beyond(&best));
+            open = if beyond(&beside) < least { Some(beside) } else { open };
+        }
+        if let Some(open) = open.filter(|open| open.left < best.left) {
             return if much { self.constant(open.chosen) } else { Ok(open.chosen) };
         }
         if best.kinds.is_empty() || best.left < before {
@@ -160,9 +189,13 @@ impl Logs<'_> {
         Ok(Chosen { choice, exact, fit, ..modest.chosen })
     }
 
-    /// Puts a spring or play in the drive of a joint where an account with it leaves less of that joint than the set does, at
-    /// its exact law: once beside all else that was found, and once without what may have stood in for it.
-    fn drive(&self, best: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+    /// Puts a spring or play in the drive of one of some joints where an account with it leaves less of that joint than the
+    /// set does, at its exact law: once beside all else that was found, and, unless hardly more than noise is left by that,
+    /// once without what may have stood in for it.
+    fn drive(&self, best: Chosen, joints: &[usize], progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        if joints.is_empty() {
+            return Ok(best);
+        }
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
         let blocks = |chosen: &Chosen| -> Result<Vec<Vec<f64>>, EffectError> {
             let rows = self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows;
@@ -188,7 +221,7 @@ impl Logs<'_> {
             } else {
                 (best.exact.clone(), Fit { set: all_but(&rotors), ..best.fit.clone() })
             };
-            for account in self.accounts(&others.0, &others.1)?.into_iter().take(ACCOUNTS) {
+            for account in self.accounts(joints, &others.0, &others.1)?.into_iter().take(ACCOUNTS) {
                 let joint = account.drive.joints[0];
                 let rotor = Candidate::new(Kind::Armature, vec![joint]);
                 let Some(place) = best.all.entries.iter().position(|e| e.candidate == rotor) else { continue };
@@ -200,6 +233,7 @@ impl Logs<'_> {
                 set.push(place);
                 set.sort_unstable();
                 set.dedup();
+                let own: Vec<f64> = (0..weights.len()).map(|j| if j == joint { weights[j] } else { 0.0 }).collect();
                 let turned = Turned {
                     place,
                     drive: account.drive,
@@ -208,8 +242,9 @@ impl Logs<'_> {
                 let next = self.converge(best.all.clone(), set, best.noise.clone(), Some(turned), progress)?;
                 let there = next.exact.entries.iter().any(|e| e.candidate.turns());
                 let (before, after) = (blocks(&best)?, blocks(&next)?);
-                let own: Vec<f64> = (0..weights.len()).map(|j| if j == joint { weights[j] } else { 0.0 }).collect();
-                let typical = |weights: &[f64]| (gap::mean_level(&before, weights), gap::mean_level(&after, weights));
+                let typical = |weights: &[f64]| {
+                    (gap::mean_level(&before, weights, NOTHING), gap::mean_level(&after, weights, NOTHING))
+                };
                 let ((before, after), (own_before, own_after)) = (typical(&weights), typical(&own));
                 let own_floor = gap::weighted_floor(&next.noise, &own);
                 let enough = (OF_JOINT * own_before).max(OF_FLOOR * own_floor).max(OF_EFFORT);
@@ -221,8 +256,38 @@ impl Logs<'_> {
                     break;
                 }
             }
+            let near_noise =
+                |(level, chosen): &(f64, Chosen)| *level < OF_FLOOR * gap::weighted_floor(&chosen.noise, &weights);
+            if better.as_ref().is_some_and(near_noise) {
+                break;
+            }
         }
         Ok(better.map_or(best, |(_, better)| better))
+    }
+
+    /// A choice with a drive made anew among all laws, those outside the catalogue included, as they stand in `laws`; nothing
+    /// where they lack one of its set.
+    fn beside(
+        &self,
+        chosen: &Chosen,
+        turned: &Turned,
+        mut laws: Problem,
+        progress: Progress<'_>,
+    ) -> Result<Option<Chosen>, EffectError> {
+        let same = |a: &Candidate, b: &Candidate| a.kind == b.kind && a.joints == b.joints;
+        let place = |c: usize| {
+            let candidate = &chosen.all.entries[c].candidate;
+            let at = laws.entries.iter().position(|e| same(&e.candidate, candidate))?;
+            Some((at, candidate.clone()))
+        };
+        let places: Option<Vec<(usize, Candidate)>> = chosen.choice.set.iter().map(|&c| place(c)).collect();
+        let (Some(changes), Some((rotor, _))) = (places, place(turned.place)) else { return Ok(None) };
+        laws.replace(self.model, &self.signals, &self.band, &self.still, &changes);
+        let mut set: Vec<usize> = changes.iter().map(|(at, _)| *at).collect();
+        set.sort_unstable();
+        set.dedup();
+        let turned = Some(Turned { place: rotor, ..turned.clone() });
+        self.converge(laws, set, chosen.noise.clone(), turned, progress).map(Some)
     }
 
     /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first.

@@ -330,12 +330,20 @@ fn moves(problem: &Problem, set: &[usize], forbidden: &[Kind], reach: Reach) -> 
     neighbours
 }
 
+/// Kinds that act at one place.
+const OF_A_PLACE: [Kind; 2] = [Kind::Rub, Kind::Catch];
+
 /// Whether two candidates must not stand side by side: two of one kind at the same joints, two accounts of the same force,
 /// or two accounts of where the encoder sits.
 pub fn excludes(problem: &Problem, a: usize, b: usize) -> bool {
     let (a, b) = (&problem.entries[a].candidate, &problem.entries[b].candidate);
     let both = |family: &[Kind]| family.contains(&a.kind) && family.contains(&b.kind);
-    (a.joints == b.joints && (a.kind == b.kind || both(&DRY) || both(&CONSTANT))) || both(&LATE)
+    let one_of_each = |one: Kind, others: &[Kind]| {
+        (a.kind == one && others.contains(&b.kind)) || (b.kind == one && others.contains(&a.kind))
+    };
+    // Where a place rubs, efforts are great, and a limit would cut them.
+    let force = both(&DRY) || both(&CONSTANT) || one_of_each(Kind::TorqueSaturation, &OF_A_PLACE);
+    (a.joints == b.joints && (a.kind == b.kind || force)) || both(&LATE)
 }
 
 /// Whether a candidate's kind is one that joints usually share and stands at other joints of the set too.

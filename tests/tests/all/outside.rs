@@ -4,7 +4,7 @@
 use gapscope_datasets::{Episode, Recipe, Sensors, generate};
 use gapscope_diagnosis::schema::{Diagnosis, Verdict};
 use gapscope_dynamics::{Data, Model};
-use gapscope_effects::{Armature, Effect, ViscousFriction};
+use gapscope_effects::{Armature, Backlash, Effect, ViscousFriction};
 use gapscope_tests::{diagnose, robot};
 use nalgebra::DMatrix;
 
@@ -102,4 +102,29 @@ fn a_small_unknown_beside_a_large_effect_is_not_explained_away() {
     assert_eq!(found.verdict, Verdict::PartlyExplained);
     assert!(laws(&found).contains(&"rub"), "{:?}", laws(&found));
     assert!(found.effects[0].confidence > 0.9, "{:#?}", found.effects);
+}
+
+/// Efforts are great where a place rubs, and a limit cuts great efforts: that is not what it is.
+#[test]
+fn a_spot_that_rubs_alone_is_unknown_and_no_limit() {
+    let found = diagnosed(&[], &rub);
+    assert_eq!(found.verdict, Verdict::UnknownEffect, "{:#?}", found.effects);
+    assert!(found.effects.is_empty(), "{:#?}", found.effects);
+}
+
+/// Play in the first joint and a spot that rubs in the second: the play takes most of the gap, and does not take the spot
+/// with it.
+#[test]
+fn a_spot_that_rubs_is_told_beside_play() {
+    let model = robot(ROBOT);
+    let first = model.joints()[0].name.clone();
+    let gap = [(first.clone(), 0.03)].into();
+    let armature = [(first.clone(), 0.2)].into();
+    let found = diagnosed(&[Effect::Backlash(Backlash { gap }), Effect::Armature(Armature { armature })], &rub);
+    let mut kinds: Vec<&str> = found.effects.iter().map(|e| e.kind.as_str()).collect();
+    kinds.sort_unstable();
+    assert_eq!(kinds, ["armature", "backlash"], "{:#?}", found.effects);
+    assert!(found.effects.iter().all(|e| e.joints == std::slice::from_ref(&first)), "{:#?}", found.effects);
+    assert_eq!(found.verdict, Verdict::PartlyExplained);
+    assert!(laws(&found).contains(&"rub"), "{:?}", laws(&found));
 }

@@ -29,6 +29,9 @@ const OF_FLOOR: f64 = 3.0;
 /// ... or what is nobody's concern, as a part of the effort's variation. A resonance of its own takes half of anything that
 /// sways.
 const OF_EFFORT: f64 = 0.01;
+/// Where no more than noise is left of a joint, an account must be better by so many standard errors: one chance in twenty
+/// over the hundred or so knobs, sides and joints that are tried.
+const IN_NOISE: f64 = 3.3;
 /// Part of the effort's variation that counts as nothing in a block of time: play may show in few blocks.
 const NOTHING: f64 = 1e-3;
 /// Another account of a drive is better where it leaves this part of the gap.
@@ -202,6 +205,7 @@ impl Logs<'_> {
             Ok(gap::squares(&self.band, &self.beside_outside(&chosen.exact, &chosen.fit.set, &rows), |_| true))
         };
         let kinds = |chosen: &Chosen| select::kinds(&chosen.exact, &chosen.fit.set).len() as f64;
+        let before = blocks(&best)?;
         let mut better: Option<(f64, Chosen)> = None;
         let of = |kinds: &[Kind]| -> Vec<usize> {
             let is = |&i: &usize| kinds.contains(&best.exact.entries[i].candidate.kind);
@@ -223,6 +227,13 @@ impl Logs<'_> {
             };
             for account in self.accounts(joints, &others.0, &others.1)?.into_iter().take(ACCOUNTS) {
                 let joint = account.drive.joints[0];
+                let own: Vec<f64> = (0..weights.len()).map(|j| if j == joint { weights[j] } else { 0.0 }).collect();
+                let rest = gap::weighted_rms(&gap::total(&before), &own);
+                let floor = gap::weighted_floor(&best.noise, &own);
+                let more_than_noise = verdict::Judged { before: rest, after: rest, floor }.leaves_any();
+                if !more_than_noise && account.beyond < IN_NOISE {
+                    continue;
+                }
                 let rotor = Candidate::new(Kind::Armature, vec![joint]);
                 let Some(place) = best.all.entries.iter().position(|e| e.candidate == rotor) else { continue };
                 let leaves = |c: usize| {
@@ -233,7 +244,6 @@ impl Logs<'_> {
                 set.push(place);
                 set.sort_unstable();
                 set.dedup();
-                let own: Vec<f64> = (0..weights.len()).map(|j| if j == joint { weights[j] } else { 0.0 }).collect();
                 let turned = Turned {
                     place,
                     drive: account.drive,
@@ -241,7 +251,7 @@ impl Logs<'_> {
                 };
                 let next = self.converge(best.all.clone(), set, best.noise.clone(), Some(turned), progress)?;
                 let there = next.exact.entries.iter().any(|e| e.candidate.turns());
-                let (before, after) = (blocks(&best)?, blocks(&next)?);
+                let after = blocks(&next)?;
                 let typical = |weights: &[f64]| {
                     (gap::mean_level(&before, weights, NOTHING), gap::mean_level(&after, weights, NOTHING))
                 };

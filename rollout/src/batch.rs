@@ -2,6 +2,7 @@
 
 use gapscope_dynamics::StepModel;
 use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 
 /// States that a worker steps together: enough to fill vector registers and to read a network's weights once for many.
 pub const BLOCK: usize = 64;
@@ -45,9 +46,11 @@ impl<M: StepModel + Send> Batch<M> {
         blocks: &mut [T],
         block: impl Fn(&mut M, &mut [f64], &mut [f64], &mut T) + Sync,
     ) {
-        let each = blocks.len().div_ceil(self.workers.len()).max(1);
-        self.workers.par_iter_mut().zip(blocks.par_chunks_mut(each)).for_each(|(worker, mine)| {
-            for item in mine {
+        // One at a time from what is left: a core that others use as well takes fewer.
+        let left = Mutex::new(blocks.iter_mut());
+        let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
+        self.workers.par_iter_mut().for_each(|worker| {
+            while let Some(item) = next() {
                 block(&mut worker.model, &mut worker.x, &mut worker.tau, item);
             }
         });

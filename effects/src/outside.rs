@@ -9,10 +9,8 @@ use glam::DVec3;
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
-/// From a place to where it acts no more, rad (m): a bearing or a cable changes its torque over no less.
+/// From one place to the next, rad (m): a bearing or a cable changes its torque over no less.
 const PLACE: f64 = 0.1;
-/// From one place to the next, rad (m).
-const STEP: f64 = 0.05;
 
 /// Damping ratio of a mass that swings.
 const SWING_DAMPING: f64 = 0.05;
@@ -84,12 +82,12 @@ pub(crate) fn catch(motion: &Motion, joint: usize, place: f64) -> Vec<Column> {
 
 /// Places along a joint's travel, rad (m); its least position alone where it has no finite extent.
 pub(crate) fn places(range: &Range) -> impl Iterator<Item = f64> {
-    let count = if range.span.is_finite() { (range.span / STEP).ceil().min(400.0) as usize } else { 0 };
+    let count = if range.span.is_finite() { (range.span / PLACE).ceil().min(200.0) as usize } else { 0 };
     let first = range.least;
-    (0..=count).map(move |i| first + STEP * i as f64)
+    (0..=count).map(move |i| first + PLACE * i as f64)
 }
 
-/// Λ: 1 at the place, 0 at the width of one, linear between: sums of these are any function of the position.
+/// Λ: 1 at the place, 0 at its neighbours, linear between: sums of these are any function of the position.
 fn near(q: f64, place: f64) -> f64 {
     (1.0 - (q - place).abs() / PLACE).max(0.0)
 }

@@ -42,9 +42,10 @@ const FARTHEST: f64 = 0.5;
 const BEYOND_DOUBT: f64 = 1.0;
 /// ... and this part of the mean square, or less.
 const PART: f64 = 0.85;
-/// Part of the noise, and of the effort, below which what is left of a block of time is as good as nothing.
+/// Part of the noise, and of the effort, below which what is left of a block of time is as good as nothing: play may show in
+/// few of them.
 const OF_NOISE: f64 = 0.25;
-const OF_EFFORT: f64 = 1e-3;
+pub(crate) const NOTHING: f64 = 1e-3;
 /// Resonances, Hz, between which a spring is one that somebody would build and that these logs could show.
 const SOFTEST: f64 = 1.5;
 const STIFFEST: f64 = 20.0;
@@ -119,7 +120,7 @@ impl<'a> Study<'a> {
         let inertia = mean(&runs.iter().map(|run| mean(&run.inertia)).collect::<Vec<_>>());
         let mut study = Study { logs, joint, runs, noisier: Vec::new(), nothing: 0.0, noise: Vec::new(), inertia };
         let rigid = Candidate::new(Kind::Armature, vec![joint]);
-        let rotor = study.rotor(&rigid, 0.0);
+        let rotor = study.rotor(&rigid);
         let rest: Vec<Vec<f64>> = study.runs.iter().map(|run| run.left_by(&rigid, rotor)).collect();
         // What is white of the effort, and not taken up by the motion, is noise of its measurement.
         let alone: Vec<Vec<Vec<f64>>> = rest.iter().map(|rest| vec![rest.clone()]).collect();
@@ -140,13 +141,13 @@ impl<'a> Study<'a> {
             .collect();
         study.noise = study.noise(&rigid, rotor, &study.rows(&rigid, rotor));
         let effort = mean(&logs.signals.iter().map(|s| mean_square(&s.tau[joint])).collect::<Vec<_>>());
-        study.nothing = OF_NOISE * mean(&study.noise) + OF_EFFORT * OF_EFFORT * effort;
+        study.nothing = OF_NOISE * mean(&study.noise) + NOTHING * NOTHING * effort;
         study
     }
 
     fn best(&self) -> Option<Account> {
         let rigid = Candidate::new(Kind::Armature, vec![self.joint]);
-        let rotor = self.rotor(&rigid, 0.0);
+        let rotor = self.rotor(&rigid);
         let (_, rigid_rotor) = self.turn(rigid.clone(), rotor);
         let without = self.left(&rigid, rigid_rotor);
         if without.iter().filter(|left| **left > 2.0 * self.nothing).count() * RARE < without.len() {
@@ -205,18 +206,17 @@ impl<'a> Study<'a> {
             .then_some(Account { drive: Candidate { knob_error, ..drive }, beyond })
     }
 
-    /// The rotor with which a drive leaves least, by least squares from one nearby: more of it takes as much as the joint
-    /// accelerates, whatever the drive does beside.
-    fn rotor(&self, drive: &Candidate, near: f64) -> f64 {
+    /// The rotor with which a rigid drive leaves least, by least squares.
+    fn rotor(&self, rigid: &Candidate) -> f64 {
         let (mut product, mut square) = (0.0, 0.0);
         for run in &self.runs {
-            for (rest, a) in run.left_by(drive, near).iter().zip(&run.acceleration) {
+            for (rest, a) in run.left_by(rigid, 0.0).iter().zip(&run.acceleration) {
                 product += rest * a;
                 square += a * a;
             }
         }
-        let step = if square > 0.0 { product / square } else { 0.0 };
-        (near + step).max(LIGHTEST * self.inertia)
+        let rotor = if square > 0.0 { product / square } else { 0.0 };
+        rotor.max(LIGHTEST * self.inertia)
     }
 
     /// Knob and rotor of a drive after some Gauss–Newton steps in compliance or gap, in which what is left is nearly linear;

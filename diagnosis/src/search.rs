@@ -3,6 +3,7 @@
 use crate::constancy;
 use crate::corrected::residual;
 use crate::diagnose::{Logs, Progress};
+use crate::drive::NOTHING;
 use crate::estimate::Fit;
 use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
@@ -32,8 +33,6 @@ const OF_EFFORT: f64 = 0.01;
 /// Where no more than noise is left of a joint, an account must be better by so many standard errors: one chance in twenty
 /// over the hundred or so knobs, sides and joints that are tried.
 const IN_NOISE: f64 = 3.3;
-/// Part of the effort's variation that counts as nothing in a block of time: play may show in few blocks.
-const NOTHING: f64 = 1e-3;
 /// Another account of a drive is better where it leaves this part of the gap.
 const BETTER: f64 = 0.95;
 /// Times that the choice is made, each around the exact parameters of the one before.

@@ -147,3 +147,36 @@ pub fn change(before: &[Vec<f64>], after: &[Vec<f64>], weights: &[f64], floor: f
 
 /// A gap below this multiple of the floor is at the floor: below one, because the floor is an estimate itself.
 const AT_FLOOR: f64 = 0.8;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Five blocks of ten rows in which each of two joints is off by one, and one block in which `joint` is off by far more.
+    fn blocks(joint: usize) -> Vec<Vec<f64>> {
+        let mut blocks = vec![vec![10.0; 3]; 5];
+        blocks[3][joint] = 1e6;
+        blocks
+    }
+
+    #[test]
+    fn a_jolt_is_forgiven_where_there_is_play_and_nowhere_else() {
+        let (weights, play_in_the_first) = ([1.0; 2], [true, false]);
+        assert!((calm(&blocks(0), &weights, &play_in_the_first) - 1.0).abs() < 1e-12);
+        let elsewhere = calm(&blocks(1), &weights, &play_in_the_first);
+        assert_eq!(elsewhere, weighted_rms(&total(&blocks(1)), &weights));
+        assert!(elsewhere > 50.0, "{elsewhere}");
+    }
+
+    #[test]
+    fn blocks_in_which_next_to_nothing_is_left_do_not_outweigh_the_one_that_tells() {
+        // Off by 1e-6 and then 4e-6 in four blocks, by 1 and then 0.01 in the fifth.
+        let blocks = |small: f64, large: f64| -> Vec<Vec<f64>> {
+            [small, small, large, small, small].map(|x: f64| vec![x * x, 1.0]).to_vec()
+        };
+        let (before, after) = (blocks(1e-6, 1.0), blocks(4e-6, 0.01));
+        let level = |blocks: &[Vec<f64>], nothing| mean_level(blocks, &[1.0], nothing);
+        assert!(level(&after, 1e-3) < 0.5 * level(&before, 1e-3));
+        assert!(level(&after, 0.0) > level(&before, 0.0), "what nothing is for");
+    }
+}

@@ -17,8 +17,10 @@ use rayon::prelude::*;
 /// Standard error below which the part that speaks for the other law is not believed: no drive is one or the other exactly.
 const INEXACT: f64 = 0.15;
 
-/// Time of the lag, over the law's own, by which that effort is smoothed both ways: the motion has noise too, and what of it
-/// goes with itself a moment before would speak for a lag.
+/// Time of the lag by which that effort is smoothed both ways, s, and its least over the law's own: the motion has noise too,
+/// which is in what is left as well, and in the effort where a servo answers to it. Both grow with the frequency far faster
+/// than what tells the laws apart.
+const SMOOTH: f64 = 0.2;
 const WIDER: f64 = 2.0;
 
 impl Logs<'_> {
@@ -92,7 +94,7 @@ impl Logs<'_> {
 
 /// What the first law makes of a torque, smoothed, less what the second does; `h` s from sample to sample.
 fn difference(torque: &[f64], laws: [&Candidate; 2], h: f64) -> Vec<f64> {
-    let wide = WIDER * laws[0].shape.max(laws[1].shape);
+    let wide = (WIDER * laws[0].shape.max(laws[1].shape)).max(SMOOTH);
     let mut smooth = passed(torque, Kind::ActuatorLag, wide, h);
     smooth.reverse();
     smooth = passed(&smooth, Kind::ActuatorLag, wide, h);

@@ -26,6 +26,8 @@ pub struct Fit {
     pub columns: Vec<usize>,
     /// Their coefficients.
     pub theta: Vec<f64>,
+    /// Fold that it has not seen.
+    pub without: Option<usize>,
 }
 
 impl Fit {
@@ -33,14 +35,14 @@ impl Fit {
     pub fn on_all(problem: &Problem, set: &[usize]) -> Fit {
         let columns = problem.columns(set);
         let theta = problem.fit(&columns);
-        Fit { set: set.to_vec(), columns, theta }
+        Fit { set: set.to_vec(), columns, theta, without: None }
     }
 
     /// Fits on all rows outside each fold.
     pub fn without_folds(problem: &Problem, set: &[usize]) -> Vec<Fit> {
         let columns = problem.columns(set);
-        let fit = |theta| Fit { set: set.to_vec(), columns: columns.clone(), theta };
-        problem.fits_without(&columns).into_iter().map(fit).collect()
+        let fit = |(fold, theta)| Fit { set: set.to_vec(), columns: columns.clone(), theta, without: Some(fold) };
+        problem.fits_without(&columns).into_iter().enumerate().map(fit).collect()
     }
 
     /// Time by which the logged effort acts late against the position, s.
@@ -74,7 +76,7 @@ impl Fit {
         let mut effects: Vec<(Effect, Vec<usize>)> = Vec::new();
         for &c in &self.set {
             let (_, theta) = self.own(problem, c);
-            for effect in problem.entries[c].effects(model, &theta) {
+            for effect in problem.entries[c].effects(model, &theta, self.without) {
                 let apart = effects
                     .iter_mut()
                     .try_fold(effect, |effect, (known, made_of)| known.absorb(effect).ok_or_else(|| made_of.push(c)));
@@ -101,7 +103,7 @@ impl Fit {
             let (at, theta) = self.own(problem, c);
             let own = DMatrix::from_fn(at.len(), at.len(), |i, k| covariance[(at[i], at[k])]);
             let values = |theta: &[f64]| -> Option<Vec<Value>> {
-                let effects = problem.entries[c].effects(model, theta);
+                let effects = problem.entries[c].effects(model, theta, self.without);
                 Some(effects.iter().find(|e| e.kind() == kind)?.law().parameters())
             };
             let Some(estimates) = values(&theta) else { continue };
@@ -144,6 +146,13 @@ impl Fit {
                         (quantile * variance.sqrt()).hypot(SYSTEMATIC * size).hypot(timing)
                     })
                     .collect();
+                let at_rest = problem.entries[c].held(self.without);
+                let half = match (estimate.name, at_rest) {
+                    ("static", Some(held)) if estimate.value == [held.torque] => {
+                        vec![held.doubt.hypot(SYSTEMATIC * size)]
+                    }
+                    _ => half,
+                };
                 insert(&mut parameters, model, estimate, &half);
             }
         }

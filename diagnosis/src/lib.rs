@@ -8,6 +8,7 @@
 
 mod band;
 mod bootstrap;
+mod break_away;
 mod constancy;
 mod contact;
 mod corrected;

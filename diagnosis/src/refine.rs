@@ -132,6 +132,7 @@ impl Data<'_> {
                 }
             }
             if round >= ROUNDS || (round >= least && change < SETTLED) {
+                self.break_away(&mut problem, &fit)?;
                 return Ok((problem, fit));
             }
             let mut at = fit.clone();

@@ -103,7 +103,7 @@ impl Problem {
                     bounds.extend(columns.iter().map(|c| (c.at_least, c.at_most)));
                     let tangent = term.tangent_at.is_some();
                     let candidate = term.candidate.clone();
-                    entries.push(Entry { candidate, columns: begin..bounds.len(), rank: 0, tangent });
+                    entries.push(Entry { candidate, columns: begin..bounds.len(), rank: 0, tangent, held: Vec::new() });
                 }
                 let all = std::iter::once(&alignment).chain(columns.iter().flatten());
                 for (index, column) in all.enumerate() {

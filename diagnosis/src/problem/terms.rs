@@ -1,5 +1,6 @@
 //! What a problem is made of: candidates and their columns, with the tangent of a knob where it is to be turned.
 
+use crate::break_away::Held;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, Column, Effect, Kind, Motion};
 use std::ops::Range;
@@ -15,18 +16,32 @@ pub struct Entry {
     pub rank: usize,
     /// Whether the last column is the tangent of the knob, its coefficient the change of the knob.
     pub tangent: bool,
+    /// For Stribeck friction, what it held at rest in each fold, where that was seen.
+    pub held: Vec<Option<Held>>,
 }
 
 impl Entry {
-    /// The effects with the coefficients of the entry's columns.
-    pub fn effects(&self, model: &Model, theta: &[f64]) -> Vec<Effect> {
-        match theta.split_last() {
+    /// The effects with the coefficients of the entry's columns, as seen without one fold or with all.
+    pub fn effects(&self, model: &Model, theta: &[f64], without: Option<usize>) -> Vec<Effect> {
+        let mut effects = match theta.split_last() {
             Some((change, rest)) if self.tangent => {
                 let shape = (self.candidate.shape + change).max(KNOB_AT_LEAST * self.candidate.shape);
                 Candidate { shape, ..self.candidate.clone() }.effects(model, rest)
             }
             _ => self.candidate.effects(model, theta),
+        };
+        for effect in &mut effects {
+            if let (Effect::StribeckFriction(friction), Some(held)) = (effect, self.held(without)) {
+                friction.r#static.values_mut().for_each(|s| *s = s.max(held.torque));
+            }
         }
+        effects
+    }
+
+    /// The most that Stribeck friction held at rest, as seen without one fold or with all.
+    pub fn held(&self, without: Option<usize>) -> Option<Held> {
+        let seen = self.held.iter().enumerate().filter(|&(fold, _)| without != Some(fold));
+        seen.filter_map(|(_, held)| *held).max_by(|a, b| a.torque.total_cmp(&b.torque))
     }
 }
 

@@ -342,22 +342,28 @@ impl Logs<'_> {
         let learned = learner::learn(&self.signals, &self.band, &weights, &before.rows, &after.rows);
         let learnable = learned.map_or(0.0, |l| l.learnable(floor_rms));
         // No hand pushes twice alike: what is left while nothing pushes is what a verdict hangs on.
-        let calm = |i: usize| {
+        let untouched = |i: usize| {
             let row = &self.band.rows[i];
             let s = &self.signals[row.episode];
             let time = s.first as f64 * s.raw.dt + row.center as f64 * s.dt;
             s.pushed.iter().all(|[from, to]| time < from - EDGE || time > to + EDGE)
         };
         let pushes = effects.iter().any(|e| e.kind() == Kind::ExternalContact);
-        let counts = |i: usize| !pushes || calm(i);
+        let counts = |i: usize| !pushes || untouched(i);
         let concern = gap::weights_of_concern(model, &self.signals, &self.moving);
-        // An impact a moment early or late is no fault of the play that makes it.
+        // An impact a moment early or late is no fault of the play that makes it, and all joints feel it.
         let mut chatters = vec![false; model.dof()];
         for &c in &fit.set {
             let candidate = &problem.entries[c].candidate;
             candidate.joints.iter().for_each(|&j| chatters[j] |= candidate.kind == Kind::Backlash);
         }
-        let size = |rows: &Rows| gap::calm(&gap::squares(&self.band, rows, counts), &concern, &chatters);
+        let blocks = |rows: &Rows| gap::squares(&self.band, rows, counts);
+        let calm = gap::calm(&blocks(&after.rows), &concern, &chatters);
+        let size = |rows: &Rows| {
+            let calm: Vec<Vec<f64>> =
+                blocks(rows).into_iter().zip(&calm).filter(|(_, calm)| **calm).map(|(b, _)| b).collect();
+            gap::weighted_rms(&gap::total(&calm), &concern)
+        };
         let floor_of_concern = gap::weighted_floor(&floor, &concern);
         let judged = verdict::Judged { before: size(&before.rows), after: size(&after.rows), floor: floor_of_concern };
         let unexplained = judged.unexplained_fraction();

@@ -63,16 +63,17 @@ pub fn squares(band: &Band, rows: &Rows, keep: impl Fn(usize) -> bool) -> Vec<Ve
     sums
 }
 
-/// Weighted root mean square, of some joints that of the block in the middle: deaf to the few blocks in which they jolt.
-pub fn calm(blocks: &[Vec<f64>], weights: &[f64], jolting: &[bool]) -> f64 {
-    let mut sums = total(blocks);
-    let count = sums.last().copied().unwrap_or(0.0);
-    for j in (0..weights.len()).filter(|&j| jolting[j] && !blocks.is_empty()) {
-        let mut each: Vec<f64> = blocks.iter().map(|block| block[j] / block[weights.len()]).collect();
-        each.sort_by(f64::total_cmp);
-        sums[j] = each[each.len() / 2] * count;
-    }
-    weighted_rms(&sums, weights)
+/// Which blocks are calm: the half of them in which some joints are off by least, or all without such joints.
+pub fn calm(blocks: &[Vec<f64>], weights: &[f64], jolting: &[bool]) -> Vec<bool> {
+    let jolt = |block: &Vec<f64>| -> f64 {
+        let sum: f64 = (0..weights.len()).filter(|&j| jolting[j]).map(|j| weights[j] * weights[j] * block[j]).sum();
+        sum / block[weights.len()]
+    };
+    let jolts: Vec<f64> = blocks.iter().map(jolt).collect();
+    let mut sorted = jolts.clone();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    jolts.iter().map(|jolt| *jolt <= middle).collect()
 }
 
 /// Weighted root mean square as the geometric mean over blocks, each at least `nothing`.
@@ -160,12 +161,17 @@ mod tests {
     }
 
     #[test]
-    fn a_jolt_is_forgiven_where_there_is_play_and_nowhere_else() {
-        let (weights, play_in_the_first) = ([1.0; 2], [true, false]);
-        assert!((calm(&blocks(0), &weights, &play_in_the_first) - 1.0).abs() < 1e-12);
-        let elsewhere = calm(&blocks(1), &weights, &play_in_the_first);
-        assert_eq!(elsewhere, weighted_rms(&total(&blocks(1)), &weights));
-        assert!(elsewhere > 50.0, "{elsewhere}");
+    fn a_jolt_of_a_joint_with_play_is_forgiven_and_nothing_else() {
+        let play_in_the_first = [true, false];
+        let left = |blocks: &[Vec<f64>]| {
+            let calm = calm(blocks, &[1.0; 2], &play_in_the_first);
+            let calm: Vec<Vec<f64>> =
+                blocks.iter().zip(calm).filter(|(_, calm)| *calm).map(|(b, _)| b.clone()).collect();
+            weighted_rms(&total(&calm), &[1.0; 2])
+        };
+        assert!((left(&blocks(0)) - 1.0).abs() < 1e-12);
+        assert!(left(&blocks(1)) > 50.0);
+        assert_eq!(calm(&blocks(0), &[1.0; 2], &[false; 2]), [true; 5], "without play there are no jolts");
     }
 
     #[test]

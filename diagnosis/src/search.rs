@@ -206,6 +206,7 @@ impl Logs<'_> {
         let kinds = |chosen: &Chosen| select::kinds(&chosen.exact, &chosen.fit.set).len() as f64;
         let before = blocks(&best)?;
         let mut better: Option<(f64, Chosen)> = None;
+        let mut settled = false;
         let of = |kinds: &[Kind]| -> Vec<usize> {
             let is = |&i: &usize| kinds.contains(&best.exact.entries[i].candidate.kind);
             (0..best.exact.entries.len()).filter(is).collect()
@@ -233,10 +234,9 @@ impl Logs<'_> {
                 if !more_than_noise && account.beyond < IN_NOISE {
                     continue;
                 }
-                let rotor = Candidate::new(Kind::Armature, vec![joint]);
-                let Some(place) = best.all.entries.iter().position(|e| e.candidate == rotor) else { continue };
+                let (all, place) = self.with_rotor(&best, joint);
                 let leaves = |c: usize| {
-                    let candidate = &best.all.entries[c].candidate;
+                    let candidate = &all.entries[c].candidate;
                     gone.contains(&candidate.kind) && (gone == STANDS_IN || candidate.joints.contains(&joint))
                 };
                 let mut set: Vec<usize> = best.choice.set.iter().copied().filter(|&c| !leaves(c)).collect();
@@ -248,7 +248,7 @@ impl Logs<'_> {
                     drive: account.drive,
                     doubt: 0.5 * erfc(account.beyond / std::f64::consts::SQRT_2),
                 };
-                let next = self.converge(best.all.clone(), set, best.noise.clone(), Some(turned), progress)?;
+                let next = self.converge(all, set, best.noise.clone(), Some(turned), progress)?;
                 let there = next.exact.entries.iter().any(|e| e.candidate.turns());
                 let after = blocks(&next)?;
                 let typical = |weights: &[f64]| {
@@ -260,18 +260,31 @@ impl Logs<'_> {
                 if there && own_after < (BETTER * own_before).min(enough) && after <= before {
                     let level = after * (1.0 + A_KIND * kinds(&next));
                     if better.as_ref().is_none_or(|(least, _)| level < *least) {
+                        // Impacts that are not yet followed pass for noise: much of the joint's gap must be gone as well.
+                        settled = level < OF_FLOOR * gap::weighted_floor(&next.noise, &weights)
+                            && own_after < OF_JOINT * own_before;
                         better = Some((level, next));
                     }
                     break;
                 }
             }
-            let near_noise =
-                |(level, chosen): &(f64, Chosen)| *level < OF_FLOOR * gap::weighted_floor(&chosen.noise, &weights);
-            if better.as_ref().is_some_and(near_noise) {
+            if settled {
                 break;
             }
         }
         Ok(better.map_or(best, |(_, better)| better))
+    }
+
+    /// All candidates of a choice, and among them the place of a joint's rotor, in case the choice was made without rotors.
+    fn with_rotor(&self, chosen: &Chosen, joint: usize) -> (Problem, usize) {
+        let rotor = Candidate::new(Kind::Armature, vec![joint]);
+        let entries = &chosen.all.entries;
+        if let Some(place) = entries.iter().position(|e| e.candidate == rotor) {
+            return (chosen.all.clone(), place);
+        }
+        let open = |candidate: Candidate| Term { candidate, tangent_at: None };
+        let candidates = entries.iter().map(|e| e.candidate.clone()).chain([rotor]);
+        (self.data(&chosen.noise).problem(candidates.map(open).collect(), &weighing()), entries.len())
     }
 
     /// A choice with a drive made anew among all laws, those outside the catalogue included, as they stand in `laws`; nothing
@@ -351,9 +364,7 @@ impl Logs<'_> {
         }
         candidates.retain(|c| !forbidden.contains(&c.kind));
         let term = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
-        // A push is known by when it comes: it is no outlier.
-        let weighing = [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact]].concat();
-        let mut all = data.problem(candidates.iter().map(term).collect(), &weighing);
+        let mut all = data.problem(candidates.iter().map(term).collect(), &weighing());
         progress("choosing effects", 0.2);
         let choice = select::choose(&mut all, &self.band, &[]);
         self.converge(all, choice.set, noise, None, progress)
@@ -402,6 +413,11 @@ impl Logs<'_> {
             }
         }
     }
+}
+
+/// Kinds by what all of which leave rows are weighed. A push is known by when it comes: it is no outlier.
+fn weighing() -> Vec<Kind> {
+    [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact]].concat()
 }
 
 /// The candidates of a set, a drive in the place of its rotor.

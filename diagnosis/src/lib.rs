@@ -24,6 +24,7 @@ mod horizon;
 mod kernel;
 mod late;
 mod learner;
+mod load;
 mod power;
 mod problem;
 mod refine;

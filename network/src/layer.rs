@@ -6,10 +6,26 @@ use crate::real::Real;
 use crate::vector::{dispatched, times_plus};
 
 dispatched!(
-    /// y ← activation(W x + b) for each row of x, `[rows][inputs]`, and of y, `[rows][bias.len()]`; W column by column,
-    /// `[inputs][bias.len()]`. A row's result is the same whatever the other rows.
-    forward = forward_body(weights: &[T], bias: &[T], x: &[T], y: &mut [T], activation: Activation)
+    /// W, column by column, `[inputs][outputs]`, as [`product`] wants it for many rows: in panels of some outputs, the
+    /// last one filled up, and these one behind the other. As W is stored, a panel's rows share few sets of the
+    /// first cache and push each other out of it. `panels` has the length [`packed`].
+    pack = pack_body(weights: &[T], outputs: usize, panels: &mut [T])
 );
+dispatched!(
+    /// y ← W x + b for each row of x, `[rows][inputs]`, and of y, `[rows][bias.len()]`: from W where there is one row, from
+    /// its `panels` where there are more. A row's result is the same whatever the other rows.
+    product = product_body(weights: &[T], panels: &[T], bias: &[T], x: &[T], y: &mut [T])
+);
+dispatched!(
+    /// y ← activation(y). Apart from the product, so that its constants stay in registers.
+    activate = activate_body(y: &mut [T], activation: Activation)
+);
+
+/// Length of a layer's panels.
+pub(crate) fn packed(inputs: usize, outputs: usize) -> usize {
+    inputs * outputs.next_multiple_of(WIDEST)
+}
+
 /// tanh x ≈ x P(x²) / Q(x²), within 4 ε (relative); within 2.5 ε in `f32` where products are fused. Beyond `FLAT` the
 /// quotient stays and x grows; what exceeds one is one. Written so that what is no number stays none.
 #[inline(always)]
@@ -33,9 +49,8 @@ fn polynomial<T: Real, const REGISTER: usize>(coefficients: &[T], x: T) -> T {
     sum
 }
 
-/// y ← activation(y).
 #[inline(always)]
-fn activate<T: Real, const REGISTER: usize>(y: &mut [T], activation: Activation) {
+fn activate_body<T: Real, const REGISTER: usize>(y: &mut [T], activation: Activation) {
     let half = T::from_f64(0.5);
     match activation {
         Activation::Tanh => {
@@ -57,133 +72,124 @@ fn activate<T: Real, const REGISTER: usize>(y: &mut [T], activation: Activation)
     }
 }
 
+/// Outputs of the widest panel.
+const WIDEST: usize = 32;
+
+/// Outputs of a panel: two registers, or one where that holds all.
 #[inline(always)]
-fn forward_body<T: Real, const REGISTER: usize>(
-    weights: &[T],
-    bias: &[T],
-    x: &[T],
-    y: &mut [T],
-    activation: Activation,
-) {
-    if y.len() == bias.len() {
-        one_row::<T, REGISTER>(weights, bias, x, y);
-        return activate::<T, REGISTER>(y, activation);
+fn wide<T: Real, const REGISTER: usize>(outputs: usize) -> usize {
+    let two = 2 * REGISTER / T::BYTES;
+    if REGISTER > 16 && 2 * outputs <= two { two / 2 } else { two }
+}
+
+#[inline(always)]
+fn pack_body<T: Real, const REGISTER: usize>(weights: &[T], outputs: usize, panels: &mut [T]) {
+    match wide::<T, REGISTER>(outputs) {
+        32 => in_panels::<T, 32>(weights, outputs, panels),
+        16 => in_panels::<T, 16>(weights, outputs, panels),
+        8 => in_panels::<T, 8>(weights, outputs, panels),
+        _ => in_panels::<T, 4>(weights, outputs, panels),
     }
-    // Two registers of outputs by as many rows as leave room for weights and inputs: 12 sums of 16 registers, 16 of 32.
-    match (REGISTER, T::BYTES) {
-        (64, 4) if bias.len() > 16 => in_panels::<T, REGISTER, 32, 8>(weights, bias, x, y, activation),
-        (64, 4) => in_panels::<T, REGISTER, 16, 8>(weights, bias, x, y, activation),
-        (64, _) if bias.len() > 8 => in_panels::<T, REGISTER, 16, 8>(weights, bias, x, y, activation),
-        (32, 4) if bias.len() > 8 => in_panels::<T, REGISTER, 16, 6>(weights, bias, x, y, activation),
-        (16, 8) => in_panels::<T, REGISTER, 4, 6>(weights, bias, x, y, activation),
-        _ => in_panels::<T, REGISTER, 8, 6>(weights, bias, x, y, activation),
+}
+
+#[inline(always)]
+fn in_panels<T: Real, const WIDE: usize>(weights: &[T], outputs: usize, panels: &mut [T]) {
+    let mut panels = panels.as_chunks_mut::<WIDE>().0.iter_mut();
+    for first in (0..outputs).step_by(WIDE) {
+        for (weights, panel) in weights.chunks_exact(outputs).zip(&mut panels) {
+            match weights[first..].first_chunk() {
+                Some(weights) => *panel = *weights,
+                None => panel[..outputs - first].copy_from_slice(&weights[first..]),
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn product_body<T: Real, const REGISTER: usize>(weights: &[T], panels: &[T], bias: &[T], x: &[T], y: &mut [T]) {
+    if y.len() == bias.len() {
+        return one_row::<T, REGISTER>(weights, bias, x, y);
+    }
+    let inputs = weights.len() / bias.len();
+    // As many rows as leave room for weights and inputs: 12 sums of 16 registers, 16 of 32.
+    match (REGISTER, wide::<T, REGISTER>(bias.len())) {
+        (64, 32) => in_tiles::<T, REGISTER, 32, 8>(panels, bias, x, inputs, y),
+        (64, 16) => in_tiles::<T, REGISTER, 16, 8>(panels, bias, x, inputs, y),
+        (64, _) => in_tiles::<T, REGISTER, 8, 8>(panels, bias, x, inputs, y),
+        (_, 16) => in_tiles::<T, REGISTER, 16, 6>(panels, bias, x, inputs, y),
+        (_, 8) => in_tiles::<T, REGISTER, 8, 6>(panels, bias, x, inputs, y),
+        _ => in_tiles::<T, REGISTER, 4, 6>(panels, bias, x, inputs, y),
     }
 }
 
 /// Rows that go through all weights together: with a panel they stay in the nearest caches.
 const ROWS: usize = 64;
-/// Inputs of a panel.
-const DEEP: usize = 128;
 
-/// Weights of some outputs, input by input; no register of them straddles two lines of the cache.
-#[repr(align(64))]
-struct Panel<T, const WIDE: usize>([[T; WIDE]; DEEP]);
-
-/// The weights in panels of some outputs, copied to where they lie one behind the other: as they are stored, a panel's rows
-/// share few sets of the first cache and push each other out of it.
 #[inline(always)]
-fn in_panels<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usize>(
-    weights: &[T],
+fn in_tiles<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usize>(
+    panels: &[T],
     bias: &[T],
     x: &[T],
+    inputs: usize,
     y: &mut [T],
-    activation: Activation,
 ) {
-    let (inputs, outputs) = (weights.len() / bias.len(), bias.len());
-    let mut panel = Panel([[T::ZERO; WIDE]; DEEP]);
+    let outputs = bias.len();
+    let panels = panels.as_chunks::<WIDE>().0;
     for (x, y) in x.chunks(ROWS * inputs).zip(y.chunks_mut(ROWS * outputs)) {
-        for first in (0..outputs).step_by(WIDE) {
+        let rows = y.len() / outputs;
+        for (first, panel) in (0..outputs).step_by(WIDE).zip(panels.chunks_exact(inputs)) {
+            // What stands behind the last output is nobody's: it is computed and not kept.
+            let mut start = [T::ZERO; WIDE];
             let wide = WIDE.min(outputs - first);
-            let start: [T; WIDE] = leading(&bias[first..]);
-            for from in (0..inputs).step_by(DEEP) {
-                let deep = DEEP.min(inputs - from);
-                // What stands behind the last output is nobody's: it is computed and not kept.
-                let panel = &mut panel.0[..deep];
-                for k in 0..deep {
-                    panel[k] = leading(&weights[(from + k) * outputs + first..]);
-                }
-                let start = (from == 0).then_some(&start);
-                let rows = y.len() / outputs;
-                let mut row = 0;
-                while row < rows {
-                    let (x, y) = (&x[row * inputs + from..], &mut y[row * outputs + first..]);
-                    row += match rows - row {
-                        left if left >= TALL => {
-                            tile::<T, REGISTER, WIDE, TALL>(panel, start, x, inputs, y, outputs, wide)
-                        }
-                        4.. => tile::<T, REGISTER, WIDE, 4>(panel, start, x, inputs, y, outputs, wide),
-                        2.. => tile::<T, REGISTER, WIDE, 2>(panel, start, x, inputs, y, outputs, wide),
-                        _ => tile::<T, REGISTER, WIDE, 1>(panel, start, x, inputs, y, outputs, wide),
-                    };
-                }
+            start[..wide].copy_from_slice(&bias[first..first + wide]);
+            let mut row = 0;
+            while row < rows {
+                let (x, y) = (&x[row * inputs..], &mut y[row * outputs + first..]);
+                row += match rows - row {
+                    left if left >= TALL => tile::<T, REGISTER, WIDE, TALL>(panel, &start, x, y, outputs, wide),
+                    4.. => tile::<T, REGISTER, WIDE, 4>(panel, &start, x, y, outputs, wide),
+                    2.. => tile::<T, REGISTER, WIDE, 2>(panel, &start, x, y, outputs, wide),
+                    _ => tile::<T, REGISTER, WIDE, 1>(panel, &start, x, y, outputs, wide),
+                };
             }
         }
-        activate::<T, REGISTER>(y, activation);
     }
 }
 
-/// Adds a panel's product with R rows of x, each `inputs` behind the one before, to `wide` outputs of as many rows of y, or
-/// to `start` where there is one; R.
+/// `wide` outputs of R rows: y ← `start` and a panel's product with as many rows of x; R.
 #[inline(always)]
 fn tile<T: Real, const REGISTER: usize, const WIDE: usize, const R: usize>(
     panel: &[[T; WIDE]],
-    start: Option<&[T; WIDE]>,
+    start: &[T; WIDE],
     x: &[T],
-    inputs: usize,
     y: &mut [T],
     outputs: usize,
     wide: usize,
 ) -> usize {
-    assert!(x.len() >= (R - 1) * inputs + panel.len() && wide <= WIDE);
-    let mut sum: [[T; WIDE]; R] = match start {
-        Some(start) => [*start; R],
-        None => std::array::from_fn(|r| leading(&y[r * outputs..])),
-    };
+    let x: [&[T]; R] = std::array::from_fn(|r| &x[r * panel.len()..][..panel.len()]);
+    let mut sum = [*start; R];
     for (k, weights) in panel.iter().enumerate() {
         for r in 0..R {
-            // SAFETY: r < R and k < panel.len(); the length was checked above. Checks in here cost registers: with them the
-            // sums live in memory, at a third of the speed.
-            let x = unsafe { *x.get_unchecked(r * inputs + k) };
+            // SAFETY: each row is as long as the panel. Checks in here cost registers: with them the sums live in memory, at
+            // a third of the speed.
+            let x = unsafe { *x[r].get_unchecked(k) };
             for i in 0..WIDE {
                 sum[r][i] = times_plus::<T, REGISTER>(weights[i], x, sum[r][i]);
             }
         }
     }
     for r in 0..R {
-        match y[r * outputs..].first_chunk_mut::<WIDE>() {
-            Some(y) if wide == WIDE => *y = sum[r],
-            _ => y[r * outputs..][..wide].copy_from_slice(&sum[r][..wide]),
+        let y = &mut y[r * outputs..][..wide];
+        match y.first_chunk_mut::<WIDE>() {
+            Some(y) => *y = sum[r],
+            None => {
+                // A copy of its own: a part of the sums would keep all of them in memory.
+                let all = sum[r];
+                y.copy_from_slice(&all[..wide]);
+            }
         }
     }
     R
-}
-
-/// The first N numbers, zero where there are none.
-#[inline(always)]
-fn leading<T: Real, const N: usize>(from: &[T]) -> [T; N] {
-    match from.first_chunk() {
-        Some(first) => *first,
-        None => padded(from),
-    }
-}
-
-/// Apart, so that the common case of [`leading`] is loads and stores: in one function the two copies become one call.
-#[cold]
-#[inline(never)]
-fn padded<T: Real, const N: usize>(from: &[T]) -> [T; N] {
-    let mut out = [T::ZERO; N];
-    out[..from.len()].copy_from_slice(from);
-    out
 }
 
 /// W x + b of one row: its outputs in as many registers as there are, the weights as they are stored.
@@ -219,6 +225,22 @@ mod tests {
 
     type Layer<T> = fn(&[T], &[T], &[T], &mut [T], Activation);
 
+    /// A layer by the instructions of this processor.
+    fn forward<T: Real>(weights: &[T], bias: &[T], x: &[T], y: &mut [T], activation: Activation) {
+        let mut panels = vec![T::ZERO; packed(weights.len() / bias.len(), bias.len())];
+        pack(weights, bias.len(), &mut panels);
+        product(weights, &panels, bias, x, y);
+        activate(y, activation);
+    }
+
+    /// The same as on a processor of which nothing is known.
+    fn portable<T: Real>(weights: &[T], bias: &[T], x: &[T], y: &mut [T], activation: Activation) {
+        let mut panels = vec![T::ZERO; packed(weights.len() / bias.len(), bias.len())];
+        pack_body::<T, 16>(weights, bias.len(), &mut panels);
+        product_body::<T, 16>(weights, &panels, bias, x, y);
+        activate_body::<T, 16>(y, activation);
+    }
+
     /// tanh of each number, by a layer of one input that passes it on.
     fn tanh_of<T: Real>(layer: Layer<T>, x: &[T]) -> Vec<T> {
         let mut y = vec![T::ZERO; x.len()];
@@ -242,9 +264,9 @@ mod tests {
         let single = f64::from(f32::EPSILON);
         for (error, limit, what) in [
             (worst::<f32>(forward::<f32>, single), 2.6, "f32"),
-            (worst::<f32>(forward_body::<f32, 16>, single), 4.0, "f32 portable"),
+            (worst::<f32>(portable, single), 4.0, "f32 portable"),
             (worst::<f64>(forward::<f64>, f64::EPSILON), 4.0, "f64"),
-            (worst::<f64>(forward_body::<f64, 16>, f64::EPSILON), 4.0, "f64 portable"),
+            (worst::<f64>(portable, f64::EPSILON), 4.0, "f64 portable"),
         ] {
             assert!(error < limit, "{what}: {error} of epsilon, relative");
         }
@@ -284,7 +306,7 @@ mod tests {
     fn a_layer_is_a_matrix_product() {
         is_a_matrix_product(forward::<f32>, 1e-6);
         is_a_matrix_product(forward::<f64>, 1e-15);
-        is_a_matrix_product(forward_body::<f32, 16>, 1e-6);
-        is_a_matrix_product(forward_body::<f64, 16>, 1e-15);
+        is_a_matrix_product(portable::<f32>, 1e-6);
+        is_a_matrix_product(portable::<f64>, 1e-15);
     }
 }

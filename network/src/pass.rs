@@ -11,6 +11,8 @@ use crate::vector;
 /// most rows it has seen and allocates nothing after that.
 #[derive(Debug, Clone, Default)]
 pub struct Pass<T> {
+    /// Weights of each layer, [packed](layer::pack).
+    panels: Vec<Vec<T>>,
     /// Values of each layer but the inputs, `[rows][outputs]`.
     values: Vec<Vec<T>>,
     /// ∂L/∂ of a layer's values before its activation, and of the layer's before it.
@@ -20,7 +22,7 @@ pub struct Pass<T> {
 impl<T: Real> Pass<T> {
     /// Empty scratch.
     pub fn new() -> Self {
-        Self { values: Vec::new(), delta: [Vec::new(), Vec::new()] }
+        Self { panels: Vec::new(), values: Vec::new(), delta: [Vec::new(), Vec::new()] }
     }
 
     /// After [`Mlp::forward_batch`]: the values of the last hidden layer, `[rows][neurons]`; `None` where there is none.
@@ -57,6 +59,23 @@ impl<T: Real> Mlp<T> {
     /// # Panics
     /// If `x` is not of length rows · inputs.
     pub fn forward_batch<'a>(&self, pass: &'a mut Pass<T>, x: &[T], rows: usize) -> &'a [T] {
+        if rows > 1 {
+            self.pack(pass);
+        }
+        self.forward_packed(pass, x, rows)
+    }
+
+    /// Lays out the weights for [`Mlp::forward_packed`].
+    pub(crate) fn pack(&self, pass: &mut Pass<T>) {
+        pass.panels.resize_with(self.layers().len(), Vec::new);
+        for (panels, layer) in pass.panels.iter_mut().zip(self.layers()) {
+            panels.resize(layer::packed(layer.inputs, layer.outputs), T::ZERO);
+            layer::pack(&self.parameters()[layer.weights()], layer.outputs, panels);
+        }
+    }
+
+    /// [`Mlp::forward_batch`] after [`Mlp::pack`] of the same `pass`, with the weights still the same.
+    pub(crate) fn forward_packed<'a>(&self, pass: &'a mut Pass<T>, x: &[T], rows: usize) -> &'a [T] {
         assert_eq!(x.len(), rows * self.inputs(), "rows of inputs");
         pass.fit(self, rows);
         let last = self.layers().len() - 1;
@@ -65,7 +84,9 @@ impl<T: Real> Mlp<T> {
             let input = before.last().map_or(x, Vec::as_slice);
             let (weights, bias) = (&self.parameters()[layer.weights()], &self.parameters()[layer.bias()]);
             let activation = if l == last { Activation::Identity } else { self.activation() };
-            layer::forward(weights, bias, input, &mut values[0], activation);
+            let panels = pass.panels.get(l).map_or(&[][..], Vec::as_slice);
+            layer::product(weights, panels, bias, input, &mut values[0]);
+            layer::activate(&mut values[0], activation);
         }
         &pass.values[last]
     }
@@ -89,7 +110,7 @@ impl<T: Real> Mlp<T> {
         assert_eq!(x.len(), rows * self.inputs(), "rows of inputs");
         assert_eq!(output_gradient.len(), rows * self.outputs(), "rows of ∂L/∂y");
         assert_eq!(gradient.len(), self.parameters().len(), "one number a parameter");
-        let Pass { values, delta: [delta, before] } = pass;
+        let Pass { values, delta: [delta, before], .. } = pass;
         let (mut delta, mut before) = (delta, before);
         delta[..output_gradient.len()].copy_from_slice(output_gradient);
         for (l, layer) in self.layers().iter().enumerate().rev() {

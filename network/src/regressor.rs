@@ -60,7 +60,8 @@ impl<T: Real> Net<T> {
     /// The network with scratch.
     pub fn new(network: Mlp<T>) -> Self {
         let (mut pass, x) = (Pass::new(), vec![T::ZERO; network.inputs()]);
-        network.forward_batch(&mut pass, &x, 1);
+        network.pack(&mut pass);
+        network.forward_packed(&mut pass, &x, 1);
         Self { network, pass, x }
     }
 
@@ -87,7 +88,7 @@ impl<T: Real> Regressor for Net<T> {
         }
         let own = &mut self.x[..x.len()];
         own.iter_mut().zip(x).for_each(|(own, x)| *own = T::from_f64(*x));
-        let out = self.network.forward_batch(&mut self.pass, own, x.len() / self.network.inputs());
+        let out = self.network.forward_packed(&mut self.pass, own, x.len() / self.network.inputs());
         y.iter_mut().zip(out).for_each(|(y, out)| *y = out.to_f64());
     }
     /// Exact, by backpropagation of one row an output.

@@ -91,7 +91,7 @@ impl Discrete {
         self.integrator
     }
 
-    /// Moves the lanes of `eight.start` on under `torque`.
+    /// The mean slope over a step of the lanes of `eight.start` under `torque`, in `eight.sum`.
     fn step_lanes(&mut self) {
         let (n, dt) = (self.model.dof(), self.dt);
         let Buffers { start, stage, slope, sum } = &mut self.eight;
@@ -102,11 +102,12 @@ impl Discrete {
             let (rate, acceleration) = slope.split_at_mut(n);
             rate.copy_from_slice(v);
             self.model.forward_dynamics_lanes(&mut self.lanes, q, v, &self.torque, acceleration);
-            let sums = sum.iter_mut().zip(stage.iter_mut());
-            for ((sum, stage), (start, slope)) in sums.zip(start.iter().zip(slope.iter())) {
-                for k in 0..LANES {
-                    sum[k] += weight * slope[k];
-                    stage[k] = start[k] + reach * dt * slope[k];
+            for (sum, slope) in sum.iter_mut().zip(slope.iter()) {
+                (0..LANES).for_each(|k| sum[k] += weight * slope[k]);
+            }
+            if reach > 0.0 {
+                for ((stage, start), slope) in stage.iter_mut().zip(start.iter()).zip(slope.iter()) {
+                    (0..LANES).for_each(|k| stage[k] = start[k] + reach * dt * slope[k]);
                 }
             }
         }
@@ -115,9 +116,6 @@ impl Discrete {
             for (position, velocity) in positions.iter_mut().zip(velocities) {
                 (0..LANES).for_each(|k| position[k] += dt * velocity[k]);
             }
-        }
-        for (start, sum) in start.iter_mut().zip(sum) {
-            (0..LANES).for_each(|k| start[k] += dt * sum[k]);
         }
     }
 }
@@ -176,7 +174,7 @@ impl StepModel for Discrete {
             }
             self.step_lanes();
             for (k, state) in x.chunks_exact_mut(2 * n).enumerate() {
-                state.iter_mut().zip(&self.eight.start).for_each(|(x, lanes)| *x = lanes[k]);
+                state.iter_mut().zip(&self.eight.sum).for_each(|(x, slope)| *x += self.dt * slope[k]);
             }
         }
     }

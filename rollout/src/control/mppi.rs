@@ -126,11 +126,16 @@ impl Block {
         let keep = settings.correlation;
         let fresh = (1.0 - keep * keep).sqrt();
         let row = BLOCK * n;
-        for first in (0..self.noise.len()).step_by(n) {
-            for (j, deviation) in settings.deviation.iter().enumerate() {
-                let i = first + j;
-                let (before, fresh) = if i >= row { (keep * self.noise[i - row], fresh) } else { (0.0, 1.0) };
-                self.noise[i] = before + fresh * deviation * random.sample::<f64, _>(StandardNormal);
+        for first in (0..self.noise.len()).step_by(row) {
+            let (before, now) = self.noise.split_at_mut(first);
+            let scale = if first == 0 { 1.0 } else { fresh };
+            for sample in now[..row].chunks_exact_mut(n) {
+                for (noise, deviation) in sample.iter_mut().zip(&settings.deviation) {
+                    *noise = scale * deviation * random.sample::<f64, _>(StandardNormal);
+                }
+            }
+            if let Some(before) = before.rchunks_exact(row).next() {
+                now.iter_mut().zip(before).for_each(|(now, before)| *now += keep * before);
             }
         }
         if self.index == 0 {

@@ -151,16 +151,18 @@ fn body<R: Real>(
     assert_eq!(tau.len(), n, "one torque a joint");
     assert_eq!(a.len(), n, "one acceleration a joint");
     assert_eq!(scratch.articulated.len(), n + 1, "scratch of this model");
-    scratch.turn_joints(segments, q);
-    for (i, segment) in segments.list.iter().enumerate() {
-        move_outwards(scratch, i, segment, R::load(q[i]), R::load(v[i]));
-    }
-    for (i, segment) in segments.list.iter().enumerate().rev() {
-        gather_inwards(scratch, i, segment, R::load(tau[i]));
-    }
     scratch.articulated[0].linear = Vector::constant(-segments.gravity);
-    for (i, segment) in segments.list.iter().enumerate() {
-        a[i] = accelerate_outwards(scratch, i, segment).store();
+    for part in 0..R::PARTS {
+        scratch.turn_joints(segments, q, part);
+        for (i, segment) in segments.list.iter().enumerate() {
+            move_outwards(scratch, i, segment, R::load(&q[i], part), R::load(&v[i], part));
+        }
+        for (i, segment) in segments.list.iter().enumerate().rev() {
+            gather_inwards(scratch, i, segment, R::load(&tau[i], part));
+        }
+        for (i, segment) in segments.list.iter().enumerate() {
+            accelerate_outwards(scratch, i, segment).store(&mut a[i], part);
+        }
     }
 }
 

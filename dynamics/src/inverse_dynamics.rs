@@ -147,21 +147,23 @@ fn body<R: Real>(
     tau: &mut [R::Outside],
 ) {
     assert_eq!(tau.len(), segments.list.len(), "one torque a joint");
-    accelerate(segments, scratch, q, v, a);
+    for part in 0..R::PARTS {
+        accelerate(segments, scratch, q, v, a, part);
 
-    // Inwards: each joint carries its body and what hangs from it.
-    for (i, segment) in segments.list.iter().enumerate().rev() {
-        let Moving { turn, origin, force, moment, .. } = scratch.moving[i + 1];
-        let along = if segment.revolute { moment.z } else { force.z };
-        tau[i] = R::splat(segment.armature).times_plus(R::load(a[i]), along).store();
-        if segment.parent > 0 {
-            let parent = &mut scratch.moving[segment.parent];
-            let (force, mut moment) = segment.pair_to_parent(turn, force, moment);
-            if segment.offset {
-                moment = origin.cross_plus(force, moment);
+        // Inwards: each joint carries its body and what hangs from it.
+        for (i, segment) in segments.list.iter().enumerate().rev() {
+            let Moving { turn, origin, force, moment, .. } = scratch.moving[i + 1];
+            let along = if segment.revolute { moment.z } else { force.z };
+            R::splat(segment.armature).times_plus(R::load(&a[i], part), along).store(&mut tau[i], part);
+            if segment.parent > 0 {
+                let parent = &mut scratch.moving[segment.parent];
+                let (force, mut moment) = segment.pair_to_parent(turn, force, moment);
+                if segment.offset {
+                    moment = origin.cross_plus(force, moment);
+                }
+                parent.force = parent.force.plus(force);
+                parent.moment = parent.moment.plus(moment);
             }
-            parent.force = parent.force.plus(force);
-            parent.moment = parent.moment.plus(moment);
         }
     }
 }
@@ -174,18 +176,19 @@ pub(crate) fn accelerate<R: Real>(
     q: &[R::Outside],
     v: &[R::Outside],
     a: &[R::Outside],
+    part: usize,
 ) {
     let n = segments.list.len();
     assert_eq!(q.len(), n, "one position a joint");
     assert_eq!(v.len(), n, "one velocity a joint");
     assert_eq!(a.len(), n, "one acceleration a joint");
     assert_eq!(scratch.moving.len(), n + 1, "scratch of this model");
-    scratch.turn_joints(segments, q);
+    scratch.turn_joints(segments, q, part);
     scratch.moving[0].linear = Vector::constant(-segments.gravity);
 
     for (i, segment) in segments.list.iter().enumerate() {
         let turn = scratch.turn(i);
-        let (q, v, a) = (R::load(q[i]), R::load(v[i]), R::load(a[i]));
+        let (q, v, a) = (R::load(&q[i], part), R::load(&v[i], part), R::load(&a[i], part));
         let parent = &scratch.moving[segment.parent];
         let origin = segment.origin_at(q);
         let linear = if segment.offset { parent.spin.times_plus(origin, parent.linear) } else { parent.linear };

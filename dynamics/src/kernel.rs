@@ -64,13 +64,13 @@ impl<R: Real> Scratch<R> {
         }
     }
 
-    /// Sines and cosines of all joints at positions `q`, as one row of numbers.
+    /// Sines and cosines of all joints at a part of the positions `q`, as one row of numbers.
     #[inline(always)]
-    pub fn turn_joints(&mut self, segments: &Segments, q: &[R::Outside]) {
+    pub fn turn_joints(&mut self, segments: &Segments, q: &[R::Outside], part: usize) {
         let angles = self.angles.as_flattened_mut();
         for (i, (segment, q)) in segments.list.iter().zip(q).enumerate() {
             let fixed = R::splat(segment.angle);
-            let angle = if segment.revolute { R::load(*q) + fixed } else { fixed };
+            let angle = if segment.revolute { R::load(q, part) + fixed } else { fixed };
             angle.scatter(&mut angles[i * R::WIDTH..]);
         }
         for (angles, (sine, cosine)) in self.angles.iter().zip(self.sine.iter_mut().zip(&mut self.cosine)) {

@@ -53,7 +53,7 @@ fn portable(segments: &Segments, scratch: &mut Scratch<One<false>>, q: &[f64], o
 /// The processor must have the features.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
-unsafe fn avx512<R: Real>(segments: &Segments, scratch: &mut Scratch<R>, q: &[R::Outside], out: &mut [R::Outside]) {
+unsafe fn avx512<R: Real<Outside = f64>>(segments: &Segments, scratch: &mut Scratch<R>, q: &[f64], out: &mut [f64]) {
     body(segments, scratch, q, out);
 }
 
@@ -61,26 +61,26 @@ unsafe fn avx512<R: Real>(segments: &Segments, scratch: &mut Scratch<R>, q: &[R:
 /// The processor must have the features.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn avx2<R: Real>(segments: &Segments, scratch: &mut Scratch<R>, q: &[R::Outside], out: &mut [R::Outside]) {
+unsafe fn avx2<R: Real<Outside = f64>>(segments: &Segments, scratch: &mut Scratch<R>, q: &[f64], out: &mut [f64]) {
     body(segments, scratch, q, out);
 }
 
 #[inline(always)]
-fn body<R: Real>(segments: &Segments, scratch: &mut Scratch<R>, q: &[R::Outside], out: &mut [R::Outside]) {
+fn body<R: Real<Outside = f64>>(segments: &Segments, scratch: &mut Scratch<R>, q: &[f64], out: &mut [f64]) {
     let n = segments.list.len();
     assert_eq!(q.len(), n, "one position a joint");
     assert_eq!(scratch.composite.len(), n + 1, "scratch of this model");
-    scratch.turn_joints(segments, q);
+    scratch.turn_joints(segments, q, 0);
     for (i, segment) in segments.list.iter().enumerate() {
         scratch.composite[i + 1] = Composite {
             turn: scratch.turn(i),
-            origin: segment.origin_at(R::load(q[i])),
+            origin: segment.origin_at(R::load(&q[i], 0)),
             mass: R::splat(segment.mass),
             first_moment: Vector::constant(segment.first_moment),
             rotational: Symmetric::constant(&segment.rotational),
         };
     }
-    out.fill(R::ZERO.store());
+    out.fill(0.0);
     for (i, segment) in segments.list.iter().enumerate().rev() {
         let Composite { turn, origin, mass, first_moment: h, rotational } = scratch.composite[i + 1];
         // The force that moves the composite at unit acceleration of the joint.
@@ -90,7 +90,7 @@ fn body<R: Real>(segments: &Segments, scratch: &mut Scratch<R>, q: &[R::Outside]
         } else {
             (Vector { x: h.y, y: -h.x, z: R::ZERO }, Vector { x: R::ZERO, y: R::ZERO, z: mass }, mass)
         };
-        out[i * n + i] = (along + R::splat(segment.armature)).store();
+        (along + R::splat(segment.armature)).store(&mut out[i * n + i], 0);
 
         if segment.parent > 0 {
             let (mut h, mut rotational) = segment.rigid_to_parent(turn, h, rotational);
@@ -119,8 +119,8 @@ fn body<R: Real>(segments: &Segments, scratch: &mut Scratch<R>, q: &[R::Outside]
             }
             at = below.parent - 1;
             let entry = if segments.list[at].revolute { moment.z } else { force.z };
-            out[i * n + at] = entry.store();
-            out[at * n + i] = entry.store();
+            entry.store(&mut out[i * n + at], 0);
+            entry.store(&mut out[at * n + i], 0);
         }
     }
 }

@@ -20,6 +20,8 @@ pub(crate) trait Real:
     const FUSED: bool;
     /// Numbers in one value.
     const WIDTH: usize;
+    /// Values that make up what callers hold; a kernel runs once for each.
+    const PARTS: usize;
 
     /// The same number in every lane.
     fn splat(x: f64) -> Self;
@@ -27,10 +29,10 @@ pub(crate) trait Real:
     fn times_plus(self, b: Self, c: Self) -> Self;
     /// 1 / self.
     fn reciprocal(self) -> Self;
-    /// From what callers hold.
-    fn load(x: Self::Outside) -> Self;
-    /// To what callers hold.
-    fn store(self) -> Self::Outside;
+    /// From a part of what callers hold.
+    fn load(x: &Self::Outside, part: usize) -> Self;
+    /// To a part of what callers hold.
+    fn store(self, out: &mut Self::Outside, part: usize);
     /// From the first [`Real::WIDTH`] numbers of a slice.
     fn gather(x: &[f64]) -> Self;
     /// To the first [`Real::WIDTH`] numbers of a slice.
@@ -53,6 +55,7 @@ impl<const F: bool> Real for One<F> {
     const ZERO: Self = Self(0.0);
     const FUSED: bool = F;
     const WIDTH: usize = 1;
+    const PARTS: usize = 1;
 
     #[inline(always)]
     fn splat(x: f64) -> Self {
@@ -67,12 +70,12 @@ impl<const F: bool> Real for One<F> {
         Self(1.0 / self.0)
     }
     #[inline(always)]
-    fn load(x: f64) -> Self {
-        Self(x)
+    fn load(x: &f64, _: usize) -> Self {
+        Self(*x)
     }
     #[inline(always)]
-    fn store(self) -> f64 {
-        self.0
+    fn store(self, out: &mut f64, _: usize) {
+        *out = self.0;
     }
     #[inline(always)]
     fn gather(x: &[f64]) -> Self {

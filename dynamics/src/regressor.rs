@@ -36,13 +36,13 @@ fn portable(segments: &Segments, scratch: &mut Scratch<One<false>>, q: &[f64], v
 /// The processor must have the features.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
-unsafe fn avx512<R: Real>(
+unsafe fn avx512<R: Real<Outside = f64>>(
     segments: &Segments,
     scratch: &mut Scratch<R>,
-    q: &[R::Outside],
-    v: &[R::Outside],
-    a: &[R::Outside],
-    out: &mut [R::Outside],
+    q: &[f64],
+    v: &[f64],
+    a: &[f64],
+    out: &mut [f64],
 ) {
     body(segments, scratch, q, v, a, out);
 }
@@ -51,29 +51,29 @@ unsafe fn avx512<R: Real>(
 /// The processor must have the features.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn avx2<R: Real>(
+unsafe fn avx2<R: Real<Outside = f64>>(
     segments: &Segments,
     scratch: &mut Scratch<R>,
-    q: &[R::Outside],
-    v: &[R::Outside],
-    a: &[R::Outside],
-    out: &mut [R::Outside],
+    q: &[f64],
+    v: &[f64],
+    a: &[f64],
+    out: &mut [f64],
 ) {
     body(segments, scratch, q, v, a, out);
 }
 
 #[inline(always)]
-fn body<R: Real>(
+fn body<R: Real<Outside = f64>>(
     segments: &Segments,
     scratch: &mut Scratch<R>,
-    q: &[R::Outside],
-    v: &[R::Outside],
-    a: &[R::Outside],
-    out: &mut [R::Outside],
+    q: &[f64],
+    v: &[f64],
+    a: &[f64],
+    out: &mut [f64],
 ) {
     let n = segments.list.len();
-    accelerate(segments, scratch, q, v, a);
-    out.fill(R::ZERO.store());
+    accelerate(segments, scratch, q, v, a, 0);
+    out.fill(0.0);
     if n == 0 {
         return;
     }
@@ -102,7 +102,7 @@ fn body<R: Real>(
             let h = first_moment;
             let row = [slide.dot(linear), h.x, h.y, h.z, xx, xy, yy, xz, yz, zz];
             for (column, entry) in columns.chunks_exact_mut(n).zip(row) {
-                column[at] = entry.store();
+                entry.store(&mut column[at], 0);
             }
             match segments.list[at].parent {
                 0 => break,

@@ -3,6 +3,7 @@
 
 use crate::activation::Activation;
 use crate::real::Real;
+use crate::register::Register;
 use crate::vector::{dispatched, times_plus};
 
 dispatched!(
@@ -112,13 +113,17 @@ fn product_body<T: Real, const REGISTER: usize>(weights: &[T], panels: &[T], bia
     }
     let inputs = weights.len() / bias.len();
     // As many rows as leave room for weights and inputs: 12 sums of 16 registers, 16 of 32.
-    match (REGISTER, wide::<T, REGISTER>(bias.len())) {
-        (64, 32) => in_tiles::<T, REGISTER, 32, 8>(panels, bias, x, inputs, y),
-        (64, 16) => in_tiles::<T, REGISTER, 16, 8>(panels, bias, x, inputs, y),
-        (64, _) => in_tiles::<T, REGISTER, 8, 8>(panels, bias, x, inputs, y),
-        (_, 16) => in_tiles::<T, REGISTER, 16, 6>(panels, bias, x, inputs, y),
-        (_, 8) => in_tiles::<T, REGISTER, 8, 6>(panels, bias, x, inputs, y),
-        _ => in_tiles::<T, REGISTER, 4, 6>(panels, bias, x, inputs, y),
+    match (REGISTER, T::BYTES, wide::<T, REGISTER>(bias.len())) {
+        (64, 4, 32) => in_tiles::<T, T::R64, 2, 32, 8>(panels, bias, x, inputs, y),
+        (64, 4, _) => in_tiles::<T, T::R64, 1, 16, 8>(panels, bias, x, inputs, y),
+        (64, _, 16) => in_tiles::<T, T::R64, 2, 16, 8>(panels, bias, x, inputs, y),
+        (64, _, _) => in_tiles::<T, T::R64, 1, 8, 8>(panels, bias, x, inputs, y),
+        (32, 4, 16) => in_tiles::<T, T::R32, 2, 16, 6>(panels, bias, x, inputs, y),
+        (32, 4, _) => in_tiles::<T, T::R32, 1, 8, 6>(panels, bias, x, inputs, y),
+        (32, _, 8) => in_tiles::<T, T::R32, 2, 8, 6>(panels, bias, x, inputs, y),
+        (32, _, _) => in_tiles::<T, T::R32, 1, 4, 6>(panels, bias, x, inputs, y),
+        (_, 4, _) => in_tiles::<T, T::R16, 2, 8, 6>(panels, bias, x, inputs, y),
+        _ => in_tiles::<T, T::R16, 2, 4, 6>(panels, bias, x, inputs, y),
     }
 }
 
@@ -126,7 +131,7 @@ fn product_body<T: Real, const REGISTER: usize>(weights: &[T], panels: &[T], bia
 const ROWS: usize = 64;
 
 #[inline(always)]
-fn in_tiles<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usize>(
+fn in_tiles<T: Real, V: Register<T>, const ACROSS: usize, const WIDE: usize, const TALL: usize>(
     panels: &[T],
     bias: &[T],
     x: &[T],
@@ -142,50 +147,62 @@ fn in_tiles<T: Real, const REGISTER: usize, const WIDE: usize, const TALL: usize
             let mut start = [T::ZERO; WIDE];
             let wide = WIDE.min(outputs - first);
             start[..wide].copy_from_slice(&bias[first..first + wide]);
+            let mut whole = [[T::ZERO; WIDE]; TALL];
             let mut row = 0;
             while row < rows {
                 let (x, y) = (&x[row * inputs..], &mut y[row * outputs + first..]);
-                row += match rows - row {
-                    left if left >= TALL => tile::<T, REGISTER, WIDE, TALL>(panel, &start, x, y, outputs, wide),
-                    4.. => tile::<T, REGISTER, WIDE, 4>(panel, &start, x, y, outputs, wide),
-                    2.. => tile::<T, REGISTER, WIDE, 2>(panel, &start, x, y, outputs, wide),
-                    _ => tile::<T, REGISTER, WIDE, 1>(panel, &start, x, y, outputs, wide),
+                // A tile knows whole rows only.
+                let (out, stride) = if wide == WIDE { (&mut *y, outputs) } else { (whole.as_flattened_mut(), WIDE) };
+                let tall = match rows - row {
+                    left if left >= TALL => tile::<T, V, ACROSS, WIDE, TALL>(panel, &start, x, out, stride),
+                    4.. => tile::<T, V, ACROSS, WIDE, 4>(panel, &start, x, out, stride),
+                    2.. => tile::<T, V, ACROSS, WIDE, 2>(panel, &start, x, out, stride),
+                    _ => tile::<T, V, ACROSS, WIDE, 1>(panel, &start, x, out, stride),
                 };
+                if wide < WIDE {
+                    for (y, whole) in y.chunks_mut(outputs).zip(&whole[..tall]) {
+                        y[..wide].copy_from_slice(&whole[..wide]);
+                    }
+                }
+                row += tall;
             }
         }
     }
 }
 
-/// `wide` outputs of R rows: y ← `start` and a panel's product with as many rows of x; R.
+/// R rows of y, each `stride` behind the one before: y ← `start` and a panel's product with as many rows of x; R.
 #[inline(always)]
-fn tile<T: Real, const REGISTER: usize, const WIDE: usize, const R: usize>(
+fn tile<T: Real, V: Register<T>, const ACROSS: usize, const WIDE: usize, const R: usize>(
     panel: &[[T; WIDE]],
     start: &[T; WIDE],
     x: &[T],
     y: &mut [T],
-    outputs: usize,
-    wide: usize,
+    stride: usize,
 ) -> usize {
+    assert!(WIDE == ACROSS * V::LANES && y.len() >= (R - 1) * stride + WIDE, "whole rows of whole registers");
     let x: [&[T]; R] = std::array::from_fn(|r| &x[r * panel.len()..][..panel.len()]);
-    let mut sum = [*start; R];
-    for (k, weights) in panel.iter().enumerate() {
-        for r in 0..R {
-            // SAFETY: each row is as long as the panel. Checks in here cost registers: with them the sums live in memory, at
-            // a third of the speed.
-            let x = unsafe { *x[r].get_unchecked(k) };
-            for i in 0..WIDE {
-                sum[r][i] = times_plus::<T, REGISTER>(weights[i], x, sum[r][i]);
+    // SAFETY: this is compiled for the registers that were found. A row of the panel, the start and, as was checked, each
+    // row of y hold all registers across; a row of x is as long as the panel.
+    unsafe {
+        let mut across = [V::splat(T::ZERO); ACROSS];
+        for i in 0..ACROSS {
+            across[i] = V::load(start.as_ptr().add(i * V::LANES));
+        }
+        let mut sum = [across; R];
+        for (k, weights) in panel.iter().enumerate() {
+            for i in 0..ACROSS {
+                across[i] = V::load(weights.as_ptr().add(i * V::LANES));
+            }
+            for r in 0..R {
+                let x = V::splat(*x[r].get_unchecked(k));
+                for i in 0..ACROSS {
+                    sum[r][i] = across[i].times_plus(x, sum[r][i]);
+                }
             }
         }
-    }
-    for r in 0..R {
-        let y = &mut y[r * outputs..][..wide];
-        match y.first_chunk_mut::<WIDE>() {
-            Some(y) => *y = sum[r],
-            None => {
-                // A copy of its own: a part of the sums would keep all of them in memory.
-                let all = sum[r];
-                y.copy_from_slice(&all[..wide]);
+        for r in 0..R {
+            for i in 0..ACROSS {
+                sum[r][i].store(y.as_mut_ptr().add(r * stride + i * V::LANES));
             }
         }
     }

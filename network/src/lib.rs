@@ -30,6 +30,7 @@ mod normalize;
 mod pass;
 mod product;
 mod real;
+mod register;
 mod regressor;
 mod train;
 mod vector;

@@ -38,7 +38,7 @@ pub trait Real:
 
 pub(crate) mod sealed {
     /// What the vector loops need, beside arithmetic.
-    pub trait Vector: Sized + Copy + 'static {
+    pub trait Vector: Sized + Copy + crate::register::Registers + 'static {
         /// Bytes of one number.
         const BYTES: usize;
         /// safetensors' name of the type.

@@ -1,12 +1,10 @@
 //! Friction at rest: no fit of motion tells it where a joint leaves rest too fast to be seen, but rests do, by what they bear.
 
-use crate::corrected::{plant_pushed, residual};
 use crate::estimate::Fit;
 use crate::problem::Problem;
 use crate::refine::Data;
 use crate::regimes::quantile;
 use gapscope_effects::{EffectError, Kind};
-use rayon::prelude::*;
 
 /// Part of a fold that a joint must rest for its rests to tell: the blows of other joints would outweigh few of them.
 const RESTS: f64 = 0.1;
@@ -47,15 +45,7 @@ impl Data<'_> {
         if set().next().is_none() {
             return Ok(());
         }
-        let (effects, side) = (fit.effects(problem, self.model), problem.side(&fit.set));
-        let rest: Vec<Vec<Vec<f64>>> = self
-            .signals
-            .par_iter()
-            .map(|s| {
-                let mut plant = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
-                Ok(residual(&mut plant, self.model, s, self.standstill, fit.alignment()))
-            })
-            .collect::<Result<_, EffectError>>()?;
+        let rest = self.rest(problem, fit)?;
         let held: Vec<(usize, Vec<Option<Held>>)> = set()
             .filter_map(|&c| {
                 let &[j] = problem.entries[c].candidate.joints.as_slice() else { return None };
@@ -75,5 +65,21 @@ impl Data<'_> {
             problem.entries[c].held = held;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rests_bound_friction_from_below_where_they_are_not_few() {
+        // Torques beyond a friction of 1 grow to 0.5 in a hundred rests; one row alone says 7.
+        let rests = (1..=100).map(|i| Some(0.005 * f64::from(i))).chain([Some(-7.0)]);
+        let held = Held::at_rest(1.0, &rests.clone().chain(vec![None; 400]).collect::<Vec<_>>(), 0.01).unwrap();
+        assert!((held.torque - 1.49).abs() < 1e-12, "{held:?}");
+        assert!(held.doubt > 0.01);
+        assert!(Held::at_rest(1.0, &rests.chain(vec![None; 4000]).collect::<Vec<_>>(), 0.01).is_none());
+        assert!(Held::at_rest(1.0, &[], 0.01).is_none());
     }
 }

@@ -318,19 +318,7 @@ impl Logs<'_> {
         progress("held-out rollouts", 0.7);
         let before = self.nominal();
         let after = self.held_out(problem, &fit.set, true)?;
-        let final_residuals: Vec<Vec<Vec<f64>>> = self
-            .signals
-            .par_iter()
-            .map(|s| {
-                Ok(residual(
-                    &mut plant_pushed(model, &effects, side, s.dt, &s.pushed)?,
-                    model,
-                    s,
-                    &self.still,
-                    fit.alignment(),
-                ))
-            })
-            .collect::<Result<_, EffectError>>()?;
+        let final_residuals = self.data(&chosen.noise).rest(problem, fit)?;
         let floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof(), floor::lag(&effects));
         progress("intervals", 0.85);
         let everything = |_: usize| true;

@@ -4,15 +4,11 @@
 //! by the model (instrumental variables; Söderström and Stoica, Instrumental Variable Methods for System Identification,
 //! 1983).
 
-use crate::corrected::{plant_pushed, residual};
 use crate::diagnose::Logs;
-use crate::estimate::Fit;
 use crate::gap::{self, Rows};
-use crate::problem::Problem;
 use crate::search::{Chosen, with_drive};
 use crate::select::{self, LATE};
 use gapscope_effects::{Candidate, EffectError, Kind};
-use rayon::prelude::*;
 
 /// Standard error below which the part that speaks for the other law is not believed: no drive is one or the other exactly.
 const INEXACT: f64 = 0.15;
@@ -37,7 +33,9 @@ impl Logs<'_> {
         let mut set = chosen.choice.set.clone();
         set[at] = other;
         let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
-        let rests = [self.rest(&chosen.exact, &chosen.fit)?, self.rest(&exact, &fit)?];
+        let data = self.data(&chosen.noise);
+        let at_rows = |rest: Vec<Vec<Vec<f64>>>| gap::at_rows(&self.band, &rest, self.model.dof());
+        let rests = [at_rows(data.rest(&chosen.exact, &chosen.fit)?), at_rows(data.rest(&exact, &fit)?)];
         let doubt = self.speaks_for_the_second([law, &exact.entries[at].candidate], &rests);
         if doubt <= 0.5 {
             return Ok(Chosen { late_doubt: Some(doubt), ..chosen });
@@ -75,20 +73,6 @@ impl Logs<'_> {
         let error = sums.iter().map(|(l, b)| (l - part * b).powi(2)).sum::<f64>().sqrt() / between.abs();
         let odds = (2.0 * part - 1.0) / (2.0 * error.hypot(INEXACT).powi(2));
         1.0 / (1.0 + (-odds).exp())
-    }
-
-    /// What a model leaves at the rows.
-    fn rest(&self, problem: &Problem, fit: &Fit) -> Result<Rows, EffectError> {
-        let (effects, side) = (fit.effects(problem, self.model), problem.side(&fit.set));
-        let residuals: Vec<Vec<Vec<f64>>> = self
-            .signals
-            .par_iter()
-            .map(|s| {
-                let mut plant = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
-                Ok(residual(&mut plant, self.model, s, &self.still, fit.alignment()))
-            })
-            .collect::<Result<_, EffectError>>()?;
-        Ok(gap::at_rows(&self.band, &residuals, self.model.dof()))
     }
 }
 

@@ -59,6 +59,21 @@ impl Data<'_> {
         problem
     }
 
+    /// What the plant with the effects of a fit leaves of every run: `[episode][joint][signal]`, N m or N.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn rest(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
+        let (effects, side) = (fit.effects(problem, self.model), problem.side(&fit.set));
+        self.signals
+            .par_iter()
+            .map(|s| {
+                let mut plant = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
+                Ok(residual(&mut plant, self.model, s, self.standstill, fit.alignment()))
+            })
+            .collect()
+    }
+
     /// What the effects of a fit add to the residual beyond their linear signature: `[episode][joint][signal]`.
     ///
     /// # Errors

@@ -237,6 +237,13 @@ impl Logs<'_> {
         Ok(HeldOut { rows, errors })
     }
 
+    /// Held-out gap of a set, as a part of the effort's variation, beside what laws outside the catalogue in it account for.
+    pub(crate) fn left(&self, problem: &Problem, set: &[usize]) -> Result<f64, EffectError> {
+        let rows = self.beside_outside(problem, set, &self.held_out(problem, set, false)?.rows);
+        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
+        Ok(gap::weighted_rms(&gap::total(&gap::squares(&self.band, &rows, |_| true)), &weights))
+    }
+
     /// Held-out residuals of a set less what laws outside the catalogue in it account for.
     pub(crate) fn beside_outside(&self, problem: &Problem, set: &[usize], rows: &Rows) -> Rows {
         let mut rows = rows.clone();

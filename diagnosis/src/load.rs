@@ -3,8 +3,6 @@
 //! two are not told apart. The law itself tells.
 
 use crate::diagnose::Logs;
-use crate::estimate::Fit;
-use crate::gap;
 use crate::search::{Chosen, with_drive};
 use crate::select;
 use gapscope_effects::{EffectError, Kind};
@@ -28,13 +26,7 @@ impl Logs<'_> {
         set.sort_unstable();
         set.dedup();
         let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
-        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
-        let left = |exact, fit: &Fit| -> Result<f64, EffectError> {
-            let rows = self.held_out(exact, &fit.set, false)?.rows;
-            let rows = self.beside_outside(exact, &fit.set, &rows);
-            Ok(gap::weighted_rms(&gap::total(&gap::squares(&self.band, &rows, |_| true)), &weights))
-        };
-        if left(&exact, &fit)? > left(&chosen.exact, &chosen.fit)? {
+        if self.left(&exact, &fit.set)? > self.left(&chosen.exact, &chosen.fit.set)? {
             return Ok(chosen);
         }
         let choice = select::evaluate(&chosen.all, set);

@@ -114,8 +114,7 @@ impl Logs<'_> {
         let before = rms(&self.nominal_rows());
         // What the set leaves, beside what laws outside the catalogue in it account for.
         let tried = |chosen: Chosen| -> Result<Tried, EffectError> {
-            let rows = self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows;
-            let left = rms(&self.beside_outside(&chosen.exact, &chosen.fit.set, &rows));
+            let left = self.left(&chosen.exact, &chosen.fit.set)?;
             Ok(Tried { kinds: select::kinds(&chosen.exact, &chosen.fit.set), left, chosen })
         };
         let without = |kinds: &[Kind]| -> Result<Tried, EffectError> {

@@ -3,12 +3,21 @@
 
 use crate::real::Real;
 use crate::vector::times_plus;
+use wide::{F32x8, F32x16, F64x4, F64x8};
+
+/// The wide registers: arrays where nobody knows them.
 #[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::{
-    __m256, __m256d, __m512, __m512d, _mm256_fmadd_pd, _mm256_fmadd_ps, _mm256_loadu_pd, _mm256_loadu_ps,
-    _mm256_set1_pd, _mm256_set1_ps, _mm256_storeu_pd, _mm256_storeu_ps, _mm512_fmadd_pd, _mm512_fmadd_ps,
-    _mm512_loadu_pd, _mm512_loadu_ps, _mm512_set1_pd, _mm512_set1_ps, _mm512_storeu_pd, _mm512_storeu_ps,
-};
+mod wide {
+    pub use std::arch::x86_64::{__m256 as F32x8, __m256d as F64x4, __m512 as F32x16, __m512d as F64x8};
+}
+#[cfg(not(target_arch = "x86_64"))]
+mod wide {
+    use super::Plain;
+    pub type F32x8 = Plain<f32, 8>;
+    pub type F64x4 = Plain<f64, 4>;
+    pub type F32x16 = Plain<f32, 16>;
+    pub type F64x8 = Plain<f64, 8>;
+}
 
 /// Numbers that go through an instruction together.
 ///
@@ -70,39 +79,44 @@ impl<T: Real, const N: usize> Register<T> for Plain<T, N> {
 }
 
 #[cfg(target_arch = "x86_64")]
-macro_rules! register {
-    ($register:ty, $t:ty, $lanes:literal, $splat:ident, $load:ident, $store:ident, $fused:ident) => {
-        // SAFETY, for all of these: the caller has the instructions, and memory for so many numbers.
-        impl Register<$t> for $register {
-            const LANES: usize = $lanes;
-            #[inline(always)]
-            unsafe fn splat(x: $t) -> Self {
-                unsafe { $splat(x) }
-            }
-            #[inline(always)]
-            unsafe fn load(from: *const $t) -> Self {
-                unsafe { $load(from) }
-            }
-            #[inline(always)]
-            unsafe fn store(self, to: *mut $t) {
-                unsafe { $store(to, self) }
-            }
-            #[inline(always)]
-            unsafe fn times_plus(self, b: Self, c: Self) -> Self {
-                unsafe { $fused(self, b, c) }
-            }
-        }
+mod intrinsics {
+    use super::{F32x8, F32x16, F64x4, F64x8, Register};
+    use std::arch::x86_64::{
+        _mm256_fmadd_pd, _mm256_fmadd_ps, _mm256_loadu_pd, _mm256_loadu_ps, _mm256_set1_pd, _mm256_set1_ps,
+        _mm256_storeu_pd, _mm256_storeu_ps, _mm512_fmadd_pd, _mm512_fmadd_ps, _mm512_loadu_pd, _mm512_loadu_ps,
+        _mm512_set1_pd, _mm512_set1_ps, _mm512_storeu_pd, _mm512_storeu_ps,
     };
-}
 
-#[cfg(target_arch = "x86_64")]
-register!(__m256, f32, 8, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_fmadd_ps);
-#[cfg(target_arch = "x86_64")]
-register!(__m256d, f64, 4, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_fmadd_pd);
-#[cfg(target_arch = "x86_64")]
-register!(__m512, f32, 16, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_fmadd_ps);
-#[cfg(target_arch = "x86_64")]
-register!(__m512d, f64, 8, _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_fmadd_pd);
+    macro_rules! register {
+        ($register:ty, $t:ty, $lanes:literal, $splat:ident, $load:ident, $store:ident, $fused:ident) => {
+            // SAFETY, for all of these: the caller has the instructions, and memory for so many numbers.
+            impl Register<$t> for $register {
+                const LANES: usize = $lanes;
+                #[inline(always)]
+                unsafe fn splat(x: $t) -> Self {
+                    unsafe { $splat(x) }
+                }
+                #[inline(always)]
+                unsafe fn load(from: *const $t) -> Self {
+                    unsafe { $load(from) }
+                }
+                #[inline(always)]
+                unsafe fn store(self, to: *mut $t) {
+                    unsafe { $store(to, self) }
+                }
+                #[inline(always)]
+                unsafe fn times_plus(self, b: Self, c: Self) -> Self {
+                    unsafe { $fused(self, b, c) }
+                }
+            }
+        };
+    }
+
+    register!(F32x8, f32, 8, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_fmadd_ps);
+    register!(F64x4, f64, 4, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_fmadd_pd);
+    register!(F32x16, f32, 16, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_fmadd_ps);
+    register!(F64x8, f64, 8, _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_fmadd_pd);
+}
 
 /// The registers of 16, 32 and 64 bytes that a kind of number goes through.
 pub trait Registers: Sized {
@@ -116,24 +130,12 @@ pub trait Registers: Sized {
 
 impl Registers for f32 {
     type R16 = Plain<f32, 4>;
-    #[cfg(target_arch = "x86_64")]
-    type R32 = __m256;
-    #[cfg(target_arch = "x86_64")]
-    type R64 = __m512;
-    #[cfg(not(target_arch = "x86_64"))]
-    type R32 = Plain<f32, 8>;
-    #[cfg(not(target_arch = "x86_64"))]
-    type R64 = Plain<f32, 16>;
+    type R32 = F32x8;
+    type R64 = F32x16;
 }
 
 impl Registers for f64 {
     type R16 = Plain<f64, 2>;
-    #[cfg(target_arch = "x86_64")]
-    type R32 = __m256d;
-    #[cfg(target_arch = "x86_64")]
-    type R64 = __m512d;
-    #[cfg(not(target_arch = "x86_64"))]
-    type R32 = Plain<f64, 4>;
-    #[cfg(not(target_arch = "x86_64"))]
-    type R64 = Plain<f64, 8>;
+    type R32 = F64x4;
+    type R64 = F64x8;
 }

@@ -21,7 +21,8 @@ use statrs::function::erf::erfc;
 const CLEAR: f64 = 8.0;
 /// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
 const MANY: usize = 3;
-/// Laws outside the catalogue are let in where with them this part of what is more than noise is left.
+/// Laws outside the catalogue, and Stribeck friction for what motion alone shows as Coulomb friction, are let in where with
+/// them this part of what is more than noise is left.
 const OPEN: f64 = 0.75;
 /// A drive is an account of its joint if with it this part of what the joint was left with is left, ...
 const OF_JOINT: f64 = 0.25;
@@ -56,6 +57,8 @@ const STANDS_IN: [Kind; 9] = [
 const UNNOTICED: f64 = 2e-3;
 /// Part of the squared gap that must be left for a drive to be looked for near the noise floor.
 const ALL_BUT: f64 = 1e-3;
+/// A limit is known to the digit once it is reached: more than this part of what it cuts it does not leave there.
+const OF_CUT: f64 = 0.25;
 /// What a kind more must take away, relative, where two sets with a drive are compared.
 const A_KIND: f64 = 0.02;
 /// Accounts of drives that are tried beside the whole set.
@@ -121,8 +124,10 @@ impl Logs<'_> {
             tried(self.choose_among(&[kinds, &Kind::OUTSIDE].concat(), progress)?)
         };
         let mut best = without(&[])?;
+        let every = best.chosen.all.clone();
         let floor = gap::weighted_floor(&best.chosen.noise, &weights);
         let judged = |tried: &Tried| verdict::Judged { before, after: tried.left, floor };
+        let beyond = |tried: &Tried| (tried.left.powi(2) - floor.powi(2)).max(0.0).sqrt();
         let flexible: Vec<Kind> = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k)).collect();
         let bends = best.kinds.iter().any(|kind| flexible.contains(kind));
         if bends && (best.kinds.len() >= MANY || judged(&best).leaves_much()) {
@@ -138,7 +143,12 @@ impl Logs<'_> {
                 }
             }
         }
-        let beyond = |tried: &Tried| (tried.left.powi(2) - floor.powi(2)).max(0.0).sqrt();
+        if judged(&best).leaves_any()
+            && let Some(sticking) = self.sticking(&best.chosen, every)?
+        {
+            let sticking = tried(sticking)?;
+            best = if beyond(&sticking) < OPEN * beyond(&best) { sticking } else { best };
+        }
         let mut open = None;
         let mut laws = None;
         if judged(&best).leaves_any() && best.left > UNNOTICED {
@@ -325,7 +335,22 @@ impl Logs<'_> {
         Ok(chosen)
     }
 
+    /// The best set without some kinds; limits have no place in it where they leave much of what they cut.
     fn choose_among(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let chosen = self.best_of(forbidden, progress)?;
+        let (exact, fit) = (&chosen.exact, &chosen.fit);
+        let mut limits = fit.set.iter().filter(|&&c| exact.entries[c].candidate.kind == Kind::TorqueSaturation);
+        let holds = |&c: &usize| {
+            let (cut, left) = exact.where_it_acts(c, &fit.columns, &fit.theta);
+            left < OF_CUT * cut
+        };
+        if limits.all(holds) {
+            return Ok(chosen);
+        }
+        self.best_of(&[forbidden, &[Kind::TorqueSaturation]].concat(), progress)
+    }
+
+    fn best_of(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let residuals: Vec<Vec<Vec<f64>>> = self
             .signals
             .par_iter()
@@ -334,23 +359,10 @@ impl Logs<'_> {
         let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof(), 0.0);
         let data = self.data(&noise);
         let mut candidates = Candidate::all(self.model);
-        let mut ranges = ranges(self.model, &self.signals);
-        for (j, range) in ranges.iter_mut().enumerate() {
-            // A cut of an effort that is mostly noise would explain that noise by itself.
-            let noise = self.signals.iter().map(|s| s.effort_noise[j]).fold(0.0, f64::max);
-            if range.torque < CLEAR * noise {
-                range.torque = 0.0;
-            }
-        }
+        let ranges = ranges(self.model, &self.signals);
         candidates.extend(Candidate::knobs(&ranges));
-        // A limit that cuts most of an effort explains what it has cut away.
-        let typical: Vec<f64> = (0..self.model.dof())
-            .map(|j| {
-                let size: Vec<f64> = self.signals.iter().flat_map(|s| s.effort[j].iter()).map(|t| t.abs()).collect();
-                median(size)
-            })
-            .collect();
-        candidates.retain(|c| c.kind != Kind::TorqueSaturation || c.shape > typical[c.joints[0]]);
+        let limits = self.limits(&ranges);
+        candidates.retain(|c| c.kind != Kind::TorqueSaturation || limits[c.joints[0]].contains(&c.shape));
         let open = Kind::OUTSIDE.iter().any(|kind| !forbidden.contains(kind));
         let outside = if open { Candidate::outside(self.model) } else { Vec::new() };
         candidates.extend(screen::ripples(&data, &ranges, &residuals, &outside));
@@ -367,6 +379,19 @@ impl Logs<'_> {
         progress("choosing effects", 0.2);
         let choice = select::choose(&mut all, &self.band, &[]);
         self.converge(all, choice.set, noise, None, progress)
+    }
+
+    /// Where the limit of each joint's drive may lie. One that cuts most of an effort explains what it has cut away, and a cut
+    /// of no more than an effort's noise explains that noise by itself.
+    fn limits(&self, ranges: &[Range]) -> Vec<std::ops::Range<f64>> {
+        let of = |j: usize| {
+            let size: Vec<f64> = self.signals.iter().flat_map(|s| s.effort[j].iter()).map(|t| t.abs()).collect();
+            let most = self.signals.iter().flat_map(|s| s.tau[j].iter()).fold(0.0f64, |most, t| most.max(t.abs()));
+            let noise = self.signals.iter().map(|s| s.effort_noise[j]).fold(0.0, f64::max);
+            let clear = ranges[j].torque > CLEAR * noise;
+            median(size)..if clear { f64::INFINITY } else { most - CLEAR * noise }
+        };
+        (0..self.model.dof()).map(of).collect()
     }
 
     /// From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
@@ -414,9 +439,10 @@ impl Logs<'_> {
     }
 }
 
-/// Kinds by what all of which leave rows are weighed. A push is known by when it comes: it is no outlier.
+/// Kinds by what all of which leave rows are weighed. A push is known by when it comes and a limit by the effort beyond it:
+/// they are no outliers.
 fn weighing() -> Vec<Kind> {
-    [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact]].concat()
+    [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact, Kind::TorqueSaturation]].concat()
 }
 
 /// The candidates of a set, a drive in the place of its rotor.

@@ -4,7 +4,7 @@ use crate::filter::{first_derivative, first_order, second_derivative};
 use crate::plant::CONTACT;
 use crate::{Candidate, EncoderSide, Kind, Motion};
 use gapscope_dynamics::{Data, Model};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix2, Vector2};
 
 /// Longest step of the oscillator, s: a contact at 20 Hz takes a hundred of them a period.
 const STEP: f64 = 5e-4;
@@ -13,6 +13,9 @@ const STEP: f64 = 5e-4;
 const FLAT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Torque that shows play to be taken up, over what would wind the coupling by half the gap.
 const TAKEN_UP: f64 = 0.01;
+
+/// Samples, at least, from which a spring's first angle and its rate are told, by what it does in its first period.
+const LEAST_SEEN: usize = 8;
 
 /// A coupling that is so soft, under a link that falls, that it runs away begins anew from here, rad (m).
 const LET_GO: f64 = 100.0;
@@ -75,7 +78,8 @@ pub(crate) struct WindUp {
 }
 
 impl WindUp {
-    /// The forced oscillation I δ̈ = drive − τ_l(δ, δ̇), from rest under the first sample's drive.
+    /// The forced oscillation I δ̈ = drive − τ_l(δ, δ̇), from rest under the first sample's drive, or from the state that a
+    /// spring is `seen` to begin in.
     ///
     /// Where the motor's motion is logged, I is the link's inertia and `drive` the torque that the link would take if it
     /// went with its motor; where the link's is, I is the rotor's and `drive` the effort less what the rotor takes to go
@@ -96,11 +100,48 @@ impl WindUp {
         dt: f64,
         seen: Option<&[f64]>,
     ) -> WindUp {
+        let first = drive.first().copied().unwrap_or(0.0);
+        let at_rest = (first / coupling.stiffness + coupling.half_gap * first.signum(), 0.0);
+        let start = seen.filter(|_| coupling.half_gap == 0.0).and_then(|seen| {
+            let period = std::f64::consts::TAU * (inertia.first()? / coupling.stiffness).sqrt();
+            let samples = ((period / dt) as usize).clamp(LEAST_SEEN, drive.len().max(LEAST_SEEN));
+            let [drive, inertia, seen] = [drive.get(..samples)?, inertia.get(..samples)?, seen.get(..samples)?];
+            let slope = match slope {
+                Some(slope) => Some(slope.get(..samples)?),
+                None => None,
+            };
+            let torque = |drive: &[f64], start| -> Vec<f64> {
+                let run = WindUp::begun(start, drive, inertia, slope, coupling, dt, None);
+                run.angle.iter().zip(&run.rate).map(|(&angle, &rate)| coupling.torque(angle, rate)).collect()
+            };
+            let still = vec![0.0; samples];
+            let (driven, wound, turning) =
+                (torque(drive, (0.0, 0.0)), torque(&still, (1.0, 0.0)), torque(&still, (0.0, 1.0 / period)));
+            let own = Matrix2::new(
+                dot(&wound, &wound),
+                dot(&wound, &turning),
+                dot(&wound, &turning),
+                dot(&turning, &turning),
+            );
+            let rest: Vec<f64> = seen.iter().zip(&driven).map(|(seen, driven)| seen - driven).collect();
+            let start = own.cholesky()?.solve(&Vector2::new(dot(&wound, &rest), dot(&turning, &rest)));
+            start.iter().all(|x| x.is_finite()).then_some((start[0], start[1] / period))
+        });
+        WindUp::begun(start.unwrap_or(at_rest), drive, inertia, slope, coupling, dt, seen)
+    }
+
+    /// The same from an angle and its rate.
+    fn begun(
+        (mut angle, mut rate): (f64, f64),
+        drive: &[f64],
+        inertia: &[f64],
+        slope: Option<&[f64]>,
+        coupling: &Coupling,
+        dt: f64,
+        seen: Option<&[f64]>,
+    ) -> WindUp {
         let steps = (dt / STEP).ceil().max(1.0);
         let h = dt / steps;
-        let first = drive.first().copied().unwrap_or(0.0);
-        let mut angle = first / coupling.stiffness + coupling.half_gap * first.signum();
-        let mut rate = 0.0;
         let mut out = WindUp {
             angle: Vec::with_capacity(drive.len()),
             rate: Vec::with_capacity(drive.len()),
@@ -197,6 +238,10 @@ impl JointRun {
     }
 }
 
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// Time between two evaluations of an inertia, s: it changes with the pose, and is linear between.
 const EVERY: f64 = 0.02;
 
@@ -247,6 +292,20 @@ pub(crate) fn inertia_about(model: &Model, data: &mut Data, motion: &Motion, joi
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_spring_that_begins_unwound_under_load_is_followed_from_the_first_sample() {
+        let coupling = Coupling::resonant(0.2, 4.0, 0.05);
+        let (drive, inertia) = (vec![3.0; 1000], vec![0.2; 1000]);
+        let truth = WindUp::begun((0.0, 0.0), &drive, &inertia, None, &coupling, 2e-3, None);
+        let seen: Vec<f64> = (0..1000).map(|k| coupling.torque(truth.angle[k], truth.rate[k])).collect();
+        let ahead = WindUp::forced(&drive, &inertia, None, &coupling, 2e-3, Some(&seen));
+        let static_angle = 3.0 / coupling.stiffness;
+        let off = |ahead: &WindUp, k: usize| (ahead.angle[k] - truth.angle[k]).abs() / static_angle;
+        assert!((0..25).all(|k| off(&ahead, k) < 0.05), "{}", off(&ahead, 0));
+        let blind = WindUp::forced(&drive, &inertia, None, &coupling, 2e-3, None);
+        assert!(off(&blind, 0) > 0.9, "at rest under its load it would begin wound");
+    }
 
     #[test]
     fn a_link_that_falls_faster_than_its_spring_holds_stays_finite() {

@@ -303,6 +303,21 @@ impl Problem {
             .collect()
     }
 
+    /// Root mean square of what an entry adds to its joint where it adds anything, and of what all columns leave there.
+    pub fn where_it_acts(&self, c: usize, columns: &[usize], theta: &[f64]) -> (f64, f64) {
+        let (own, own_theta): (Vec<usize>, Vec<f64>) =
+            columns.iter().zip(theta).filter(|(column, _)| self.entries[c].columns.contains(column)).unzip();
+        let (mut added, mut left, mut count) = (0.0, 0.0, 0.0f64);
+        for &j in &self.entries[c].candidate.joints {
+            let rows =
+                self.joints[j].predict(&own, &own_theta).into_iter().zip(self.joints[j].residual(columns, theta));
+            for (x, rest) in rows.filter(|(x, _)| *x != 0.0) {
+                (added, left, count) = (added + x * x, left + rest * rest, count + 1.0);
+            }
+        }
+        ((added / count.max(1.0)).sqrt(), (left / count.max(1.0)).sqrt())
+    }
+
     /// What some columns add to one joint, row by row.
     pub fn predict(&self, joint: usize, columns: &[usize], theta: &[f64]) -> Vec<f64> {
         self.joints[joint].predict(columns, theta)

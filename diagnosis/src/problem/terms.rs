@@ -32,7 +32,12 @@ impl Entry {
         };
         for effect in &mut effects {
             if let (Effect::StribeckFriction(friction), Some(held)) = (effect, self.held(without)) {
-                friction.r#static.values_mut().for_each(|s| *s = s.max(held.torque));
+                let likely = held.torque..=held.torque + held.doubt;
+                for (joint, at_rest) in &mut friction.r#static {
+                    // A joint that was not pushed to where it slides tells nothing by its rest.
+                    let pushed = friction.coulomb.get(joint).is_some_and(|slides| held.torque > *slides);
+                    *at_rest = if pushed && !likely.contains(at_rest) { held.torque } else { *at_rest };
+                }
             }
         }
         effects

@@ -7,6 +7,7 @@ mod diagnosis;
 mod drives;
 mod late;
 mod learning;
+mod limits;
 mod load;
 mod next_experiment;
 mod outside;

@@ -77,9 +77,7 @@ impl Logs<'_> {
     /// The rise towards rest of a joint that leaves rest too fast shows in what it holds there, and in no row of its motion.
     pub(crate) fn sticking(&self, chosen: &Chosen, all: Problem) -> Result<Option<Chosen>, EffectError> {
         let of = |c: usize| &all.entries[c].candidate;
-        let place = |chosen: &Candidate| {
-            (0..all.entries.len()).find(|&c| of(c).kind == chosen.kind && of(c).joints == chosen.joints)
-        };
+        let place = |chosen: &Candidate| (0..all.entries.len()).find(|&c| of(c) == chosen);
         let entries = chosen.choice.set.iter().map(|&c| place(&chosen.all.entries[c].candidate));
         let Some(slides) = entries.collect::<Option<Vec<usize>>>() else { return Ok(None) };
         let mut set = slides.clone();

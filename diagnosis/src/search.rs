@@ -21,8 +21,8 @@ use statrs::function::erf::erfc;
 const CLEAR: f64 = 8.0;
 /// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
 const MANY: usize = 3;
-/// Laws outside the catalogue, and Stribeck friction for what motion alone shows as Coulomb friction, are let in where with
-/// them this part of what is more than noise is left.
+/// Laws outside the catalogue, limits that are reached now and then, and Stribeck friction for what motion alone shows as
+/// Coulomb friction are let in where with them this part of what is more than noise is left.
 const OPEN: f64 = 0.75;
 /// A drive is an account of its joint if with it this part of what the joint was left with is left, ...
 const OF_JOINT: f64 = 0.25;
@@ -124,10 +124,17 @@ impl Logs<'_> {
             tried(self.choose_among(&[kinds, &Kind::OUTSIDE].concat(), progress)?)
         };
         let mut best = without(&[])?;
-        let every = best.chosen.all.clone();
         let floor = gap::weighted_floor(&best.chosen.noise, &weights);
         let judged = |tried: &Tried| verdict::Judged { before, after: tried.left, floor };
         let beyond = |tried: &Tried| (tried.left.powi(2) - floor.powi(2)).max(0.0).sqrt();
+        if judged(&best).leaves_much() {
+            // Rows beyond a limit that is reached now and then pass for outliers, unless limits have a say in that.
+            let weighed_by = [weighing(), vec![Kind::TorqueSaturation]].concat();
+            let limited = self.best_of(&Kind::OUTSIDE, &weighed_by, progress)?;
+            let limited = if limits_hold(&limited) { Some(tried(limited)?) } else { None };
+            best = limited.filter(|limited| beyond(limited) < OPEN * beyond(&best)).unwrap_or(best);
+        }
+        let every = best.chosen.all.clone();
         let flexible: Vec<Kind> = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k)).collect();
         let bends = best.kinds.iter().any(|kind| flexible.contains(kind));
         if bends && (best.kinds.len() >= MANY || judged(&best).leaves_much()) {
@@ -337,20 +344,15 @@ impl Logs<'_> {
 
     /// The best set without some kinds; limits have no place in it where they leave much of what they cut.
     fn choose_among(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        let chosen = self.best_of(forbidden, progress)?;
-        let (exact, fit) = (&chosen.exact, &chosen.fit);
-        let mut limits = fit.set.iter().filter(|&&c| exact.entries[c].candidate.kind == Kind::TorqueSaturation);
-        let holds = |&c: &usize| {
-            let (cut, left) = exact.where_it_acts(c, &fit.columns, &fit.theta);
-            left < OF_CUT * cut
-        };
-        if limits.all(holds) {
+        let chosen = self.best_of(forbidden, &weighing(), progress)?;
+        if limits_hold(&chosen) {
             return Ok(chosen);
         }
-        self.best_of(&[forbidden, &[Kind::TorqueSaturation]].concat(), progress)
+        self.best_of(&[forbidden, &[Kind::TorqueSaturation]].concat(), &weighing(), progress)
     }
 
-    fn best_of(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
+    /// The best set without some kinds, rows weighed by what all those of others leave.
+    fn best_of(&self, forbidden: &[Kind], weighed_by: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let residuals: Vec<Vec<Vec<f64>>> = self
             .signals
             .par_iter()
@@ -375,7 +377,7 @@ impl Logs<'_> {
         }
         candidates.retain(|c| !forbidden.contains(&c.kind));
         let term = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
-        let mut all = data.problem(candidates.iter().map(term).collect(), &weighing());
+        let mut all = data.problem(candidates.iter().map(term).collect(), weighed_by);
         progress("choosing effects", 0.2);
         let choice = select::choose(&mut all, &self.band, &[]);
         self.converge(all, choice.set, noise, None, progress)
@@ -439,10 +441,19 @@ impl Logs<'_> {
     }
 }
 
-/// Kinds by what all of which leave rows are weighed. A push is known by when it comes and a limit by the effort beyond it:
-/// they are no outliers.
+/// Kinds by what all of which leave rows are weighed. A push is known by when it comes: it is no outlier.
 fn weighing() -> Vec<Kind> {
-    [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact, Kind::TorqueSaturation]].concat()
+    [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact]].concat()
+}
+
+/// Whether the limits of a set leave little of what they cut.
+fn limits_hold(chosen: &Chosen) -> bool {
+    let (exact, fit) = (&chosen.exact, &chosen.fit);
+    let limit = |c: &&usize| exact.entries[**c].candidate.kind == Kind::TorqueSaturation;
+    fit.set.iter().filter(limit).all(|&c| {
+        let (cut, left) = exact.where_it_acts(c, &fit.columns, &fit.theta);
+        left < OF_CUT * cut
+    })
 }
 
 /// The candidates of a set, a drive in the place of its rotor.

@@ -44,15 +44,16 @@ impl Data<'_> {
     /// # Errors
     /// An effect that the robot cannot have.
     pub fn break_away(&self, problem: &mut Problem, fit: &Fit) -> Result<(), EffectError> {
-        let set = || fit.set.iter().filter(|&&c| problem.entries[c].candidate.kind == Kind::StribeckFriction);
-        if set().next().is_none() {
+        let sticks = |&c: &usize| problem.entries[c].candidate.kind == Kind::StribeckFriction;
+        let (set, others): (Vec<usize>, Vec<usize>) = fit.set.iter().partition(|c| sticks(c));
+        if set.is_empty() {
             return Ok(());
         }
         // What friction holds is what all else leaves.
-        let others: Vec<usize> = fit.set.iter().copied().filter(|c| !set().any(|other| other == c)).collect();
         let rest = self.rest(problem, &Fit { set: others, ..fit.clone() })?;
-        let held: Vec<(usize, Vec<Option<Held>>)> = set()
-            .filter_map(|&c| {
+        let held: Vec<(usize, Vec<Option<Held>>)> = set
+            .into_iter()
+            .filter_map(|c| {
                 let &[j] = problem.entries[c].candidate.joints.as_slice() else { return None };
                 let mut folds = vec![Vec::new(); self.band.folds];
                 for (e, s) in self.signals.iter().enumerate() {
@@ -73,7 +74,8 @@ impl Data<'_> {
 }
 
 impl Logs<'_> {
-    /// A choice with Stribeck friction in the place of its Coulomb friction, among `all` candidates; nothing where it has none.
+    /// A choice of rigid drives with Stribeck friction in the place of its Coulomb friction, among `all` candidates; nothing
+    /// where it has none.
     /// The rise towards rest of a joint that leaves rest too fast shows in what it holds there, and in no row of its motion.
     pub(crate) fn sticking(&self, chosen: &Chosen, all: Problem) -> Result<Option<Chosen>, EffectError> {
         let of = |c: usize| &all.entries[c].candidate;
@@ -92,7 +94,7 @@ impl Logs<'_> {
                 set[i] = best;
             }
         }
-        if set == slides || chosen.turned.is_some() {
+        if set == slides {
             return Ok(None);
         }
         set.sort_unstable();

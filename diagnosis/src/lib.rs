@@ -24,6 +24,7 @@ mod horizon;
 mod kernel;
 mod late;
 mod learner;
+mod limits;
 mod load;
 mod power;
 mod problem;

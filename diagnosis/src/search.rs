@@ -7,6 +7,7 @@ use crate::drive::NOTHING;
 use crate::estimate::Fit;
 use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
+use crate::limits;
 use crate::problem::{Problem, Term};
 use crate::screen;
 use crate::select::{self, Choice};
@@ -17,8 +18,6 @@ use gapscope_effects::{Candidate, EffectError, Kind, Plant, Range};
 use rayon::prelude::*;
 use statrs::function::erf::erfc;
 
-/// A torque this many times its noise is no artefact of it.
-const CLEAR: f64 = 8.0;
 /// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
 const MANY: usize = 3;
 /// Laws outside the catalogue, limits that are reached now and then, and Stribeck friction for what motion alone shows as
@@ -57,8 +56,6 @@ const STANDS_IN: [Kind; 9] = [
 const UNNOTICED: f64 = 2e-3;
 /// Part of the squared gap that must be left for a drive to be looked for near the noise floor.
 const ALL_BUT: f64 = 1e-3;
-/// A limit is known to the digit once it is reached: more than this part of what it cuts it does not leave there.
-const OF_CUT: f64 = 0.25;
 /// What a kind more must take away, relative, where two sets with a drive are compared.
 const A_KIND: f64 = 0.02;
 /// Accounts of drives that are tried beside the whole set.
@@ -131,7 +128,7 @@ impl Logs<'_> {
             // Rows beyond a limit that is reached now and then pass for outliers, unless limits have a say in that.
             let weighed_by = [weighing(), vec![Kind::TorqueSaturation]].concat();
             let limited = self.best_of(&Kind::OUTSIDE, &weighed_by, progress)?;
-            let limited = if limits_hold(&limited) { Some(tried(limited)?) } else { None };
+            let limited = if limits::hold(&limited) { Some(tried(limited)?) } else { None };
             best = limited.filter(|limited| beyond(limited) < OPEN * beyond(&best)).unwrap_or(best);
         }
         let every = best.chosen.all.clone();
@@ -345,7 +342,7 @@ impl Logs<'_> {
     /// The best set without some kinds; limits have no place in it where they leave much of what they cut.
     fn choose_among(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let chosen = self.best_of(forbidden, &weighing(), progress)?;
-        if limits_hold(&chosen) {
+        if limits::hold(&chosen) {
             return Ok(chosen);
         }
         self.best_of(&[forbidden, &[Kind::TorqueSaturation]].concat(), &weighing(), progress)
@@ -381,19 +378,6 @@ impl Logs<'_> {
         progress("choosing effects", 0.2);
         let choice = select::choose(&mut all, &self.band, &[]);
         self.converge(all, choice.set, noise, None, progress)
-    }
-
-    /// Where the limit of each joint's drive may lie. One that cuts most of an effort explains what it has cut away, and a cut
-    /// of no more than an effort's noise explains that noise by itself.
-    fn limits(&self, ranges: &[Range]) -> Vec<std::ops::Range<f64>> {
-        let of = |j: usize| {
-            let size: Vec<f64> = self.signals.iter().flat_map(|s| s.effort[j].iter()).map(|t| t.abs()).collect();
-            let most = self.signals.iter().flat_map(|s| s.tau[j].iter()).fold(0.0f64, |most, t| most.max(t.abs()));
-            let noise = self.signals.iter().map(|s| s.effort_noise[j]).fold(0.0, f64::max);
-            let clear = ranges[j].torque > CLEAR * noise;
-            median(size)..if clear { f64::INFINITY } else { most - CLEAR * noise }
-        };
-        (0..self.model.dof()).map(of).collect()
     }
 
     /// From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
@@ -446,16 +430,6 @@ fn weighing() -> Vec<Kind> {
     [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact]].concat()
 }
 
-/// Whether the limits of a set leave little of what they cut.
-fn limits_hold(chosen: &Chosen) -> bool {
-    let (exact, fit) = (&chosen.exact, &chosen.fit);
-    let limit = |c: &&usize| exact.entries[**c].candidate.kind == Kind::TorqueSaturation;
-    fit.set.iter().filter(limit).all(|&c| {
-        let (cut, left) = exact.where_it_acts(c, &fit.columns, &fit.theta);
-        left < OF_CUT * cut
-    })
-}
-
 /// The candidates of a set, a drive in the place of its rotor.
 pub(crate) fn with_drive(problem: &Problem, set: &[usize], turned: &Option<Turned>) -> Vec<Candidate> {
     let own = |c: usize| turned.iter().find(|t| t.place == c).map(|t| t.drive.clone());
@@ -485,14 +459,6 @@ fn ranges(model: &Model, signals: &[Signals]) -> Vec<Range> {
             }
         })
         .collect()
-}
-
-fn median(mut x: Vec<f64>) -> f64 {
-    if x.is_empty() {
-        return 0.0;
-    }
-    let middle = x.len() / 2;
-    *x.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Puts the coefficients of a fit with tangents on the same candidates without them.

@@ -5,6 +5,7 @@ use crate::plant::CONTACT;
 use crate::{Candidate, EncoderSide, Kind, Motion};
 use gapscope_dynamics::{Data, Model};
 use nalgebra::{DMatrix, Matrix2, Vector2};
+use std::f64::consts::TAU;
 
 /// Longest step of the oscillator, s: a contact at 20 Hz takes a hundred of them a period.
 const STEP: f64 = 5e-4;
@@ -34,7 +35,7 @@ pub(crate) struct Coupling {
 impl Coupling {
     /// A spring by the resonance of an inertia on it, Hz, and its damping ratio.
     pub fn resonant(inertia: f64, frequency: f64, ratio: f64) -> Coupling {
-        let omega = std::f64::consts::TAU * frequency;
+        let omega = TAU * frequency;
         Coupling { stiffness: inertia * omega * omega, damping: 2.0 * ratio * inertia * omega, half_gap: 0.0 }
     }
 
@@ -77,69 +78,73 @@ pub(crate) struct WindUp {
     pub acceleration: Vec<f64>,
 }
 
-impl WindUp {
-    /// The forced oscillation I δ̈ = drive − τ_l(δ, δ̇), from rest under the first sample's drive, or from the state that a
-    /// spring is `seen` to begin in.
-    ///
-    /// Where the motor's motion is logged, I is the link's inertia and `drive` the torque that the link would take if it
-    /// went with its motor; where the link's is, I is the rotor's and `drive` the effort less what the rotor takes to go
-    /// with its link. Either way nothing is differentiated. `inertia` is kg m² (kg) sample by sample, `drive` N m (N).
-    /// Semi-implicit Euler in steps of half a millisecond.
+/// An inertia on a coupling along a run: I δ̈ = drive − slope δ − τ_l(δ, δ̇).
+///
+/// Where the motor's motion is logged, I is the link's inertia and `drive` the torque that the link would take if it went with
+/// its motor; where the link's is, I is the rotor's and `drive` the effort less what the rotor takes to go with its link.
+/// Either way nothing is differentiated.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Oscillator<'a> {
+    /// Sample by sample, N m (N).
+    pub drive: &'a [f64],
+    /// I, sample by sample, kg m² (kg).
+    pub inertia: &'a [f64],
+    /// How fast the drive falls as the angle grows, N m/rad, sample by sample: a link that sags has another weight.
+    pub slope: Option<&'a [f64]>,
+    /// What joins the two.
+    pub coupling: Coupling,
+    /// Time from one sample to the next, s.
+    pub dt: f64,
+}
+
+impl Oscillator<'_> {
+    /// The wind-up from rest under the first sample's drive, or from the state that a spring is `seen` to begin in.
     ///
     /// Left to itself the oscillation rings with the noise of the drive, and play chatters as no simulation follows.
     /// `seen` is the torque through the joint by the account of the other side of it: the angle is drawn to the one that it
     /// shows (Luenberger, IEEE Trans. Autom. Control 16(6) 1971). A torque that a model lacks shows up in full all the
     /// same, as the pull acts on what the angle does, not on what holds it.
-    ///
-    /// `slope` is how fast the drive falls as the angle grows, N m/rad, sample by sample: a link that sags has another weight.
-    pub fn forced(
-        drive: &[f64],
-        inertia: &[f64],
-        slope: Option<&[f64]>,
-        coupling: &Coupling,
-        dt: f64,
-        seen: Option<&[f64]>,
-    ) -> WindUp {
-        let first = drive.first().copied().unwrap_or(0.0);
-        let at_rest = (first / coupling.stiffness + coupling.half_gap * first.signum(), 0.0);
-        let start = seen.filter(|_| coupling.half_gap == 0.0).and_then(|seen| {
-            let period = std::f64::consts::TAU * (inertia.first()? / coupling.stiffness).sqrt();
-            let samples = ((period / dt) as usize).clamp(LEAST_SEEN, drive.len().max(LEAST_SEEN));
-            let [drive, inertia, seen] = [drive.get(..samples)?, inertia.get(..samples)?, seen.get(..samples)?];
-            let slope = match slope {
-                Some(slope) => Some(slope.get(..samples)?),
-                None => None,
-            };
-            let torque = |drive: &[f64], start| -> Vec<f64> {
-                let run = WindUp::begun(start, drive, inertia, slope, coupling, dt, None);
-                run.angle.iter().zip(&run.rate).map(|(&angle, &rate)| coupling.torque(angle, rate)).collect()
-            };
-            let still = vec![0.0; samples];
-            let (driven, wound, turning) =
-                (torque(drive, (0.0, 0.0)), torque(&still, (1.0, 0.0)), torque(&still, (0.0, 1.0 / period)));
-            let own = Matrix2::new(
-                dot(&wound, &wound),
-                dot(&wound, &turning),
-                dot(&wound, &turning),
-                dot(&turning, &turning),
-            );
-            let rest: Vec<f64> = seen.iter().zip(&driven).map(|(seen, driven)| seen - driven).collect();
-            let start = own.cholesky()?.solve(&Vector2::new(dot(&wound, &rest), dot(&turning, &rest)));
-            start.iter().all(|x| x.is_finite()).then_some((start[0], start[1] / period))
-        });
-        WindUp::begun(start.unwrap_or(at_rest), drive, inertia, slope, coupling, dt, seen)
+    pub fn wind_up(&self, seen: Option<&[f64]>) -> WindUp {
+        let first = self.drive.first().copied().unwrap_or(0.0);
+        let at_rest = (first / self.coupling.stiffness + self.coupling.half_gap * first.signum(), 0.0);
+        self.from(seen.and_then(|seen| self.start(seen)).unwrap_or(at_rest), seen)
     }
 
-    /// The same from an angle and its rate.
-    fn begun(
-        (mut angle, mut rate): (f64, f64),
-        drive: &[f64],
-        inertia: &[f64],
-        slope: Option<&[f64]>,
-        coupling: &Coupling,
-        dt: f64,
-        seen: Option<&[f64]>,
-    ) -> WindUp {
+    /// First angle and rate of a spring, of the runs from any that come nearest to the torque `seen` in the first period
+    /// (least squares); nothing for play, and for what is too short to tell.
+    fn start(&self, seen: &[f64]) -> Option<(f64, f64)> {
+        if self.coupling.half_gap > 0.0 {
+            return None;
+        }
+        let period = TAU * (self.inertia.first()? / self.coupling.stiffness).sqrt();
+        let samples = ((period / self.dt) as usize).clamp(LEAST_SEEN, self.drive.len().max(LEAST_SEEN));
+        let driven = Oscillator {
+            drive: self.drive.get(..samples)?,
+            inertia: self.inertia.get(..samples)?,
+            slope: self.slope.and_then(|slope| slope.get(..samples)),
+            ..*self
+        };
+        let still = vec![0.0; samples];
+        let free = Oscillator { drive: &still, ..driven };
+        // Without play the torque is linear in the state that it begins in.
+        let [forced, wound, turning] =
+            [driven.torque_from((0.0, 0.0)), free.torque_from((1.0, 0.0)), free.torque_from((0.0, 1.0 / period))];
+        let rest: Vec<f64> = seen.get(..samples)?.iter().zip(&forced).map(|(seen, forced)| seen - forced).collect();
+        let across = dot(&wound, &turning);
+        let own = Matrix2::new(dot(&wound, &wound), across, across, dot(&turning, &turning));
+        let start = own.cholesky()?.solve(&Vector2::new(dot(&wound, &rest), dot(&turning, &rest)));
+        start.iter().all(|x| x.is_finite()).then_some((start[0], start[1] / period))
+    }
+
+    /// Torque through the coupling of a run left to itself from an angle and its rate, N m (N).
+    fn torque_from(&self, start: (f64, f64)) -> Vec<f64> {
+        let run = self.from(start, None);
+        run.angle.iter().zip(&run.rate).map(|(&angle, &rate)| self.coupling.torque(angle, rate)).collect()
+    }
+
+    /// The wind-up from an angle and its rate, semi-implicit Euler in steps of half a millisecond.
+    fn from(&self, (mut angle, mut rate): (f64, f64), seen: Option<&[f64]>) -> WindUp {
+        let Oscillator { drive, inertia, slope, coupling, dt } = *self;
         let steps = (dt / STEP).ceil().max(1.0);
         let h = dt / steps;
         let mut out = WindUp {
@@ -170,13 +175,17 @@ impl WindUp {
         }
         out
     }
+}
 
+impl WindUp {
     /// Of a motor along the logged motion of its link: of the torque that `turning` the motor leaves and of the one `taken`
     /// by the link, N m (N). A spring shows its angle by the torque that goes through it; a motor in its play by how it is
     /// driven.
     pub fn of_motor(turning: &[f64], taken: &[f64], rotor: f64, coupling: &Coupling, dt: f64) -> WindUp {
         if coupling.half_gap > 0.0 && rotor > 0.0 {
-            return WindUp::forced(turning, &vec![rotor; turning.len()], None, coupling, dt, Some(taken));
+            let inertia = vec![rotor; turning.len()];
+            let motor = Oscillator { drive: turning, inertia: &inertia, slope: None, coupling: *coupling, dt };
+            return motor.wind_up(Some(taken));
         }
         let wound: Vec<f64> = taken.iter().map(|torque| torque / coupling.stiffness).collect();
         WindUp::of(first_order(&wound, coupling.damping / coupling.stiffness, dt), dt)
@@ -225,7 +234,8 @@ impl JointRun {
         match drive.side {
             EncoderSide::Motor => {
                 let slope = Some(&self.slope[..]);
-                let ahead = WindUp::forced(&link, &self.inertia, slope, &coupling, self.dt, Some(&motor));
+                let own = Oscillator { drive: &link, inertia: &self.inertia, slope, coupling, dt: self.dt };
+                let ahead = own.wind_up(Some(&motor));
                 let taken =
                     |k: usize| link[k] - self.slope[k] * ahead.angle[k] - self.inertia[k] * ahead.acceleration[k];
                 all.map(|k| motor[k] - taken(k)).collect()
@@ -297,13 +307,14 @@ mod tests {
     fn a_spring_that_begins_unwound_under_load_is_followed_from_the_first_sample() {
         let coupling = Coupling::resonant(0.2, 4.0, 0.05);
         let (drive, inertia) = (vec![3.0; 1000], vec![0.2; 1000]);
-        let truth = WindUp::begun((0.0, 0.0), &drive, &inertia, None, &coupling, 2e-3, None);
+        let link = Oscillator { drive: &drive, inertia: &inertia, slope: None, coupling, dt: 2e-3 };
+        let truth = link.from((0.0, 0.0), None);
         let seen: Vec<f64> = (0..1000).map(|k| coupling.torque(truth.angle[k], truth.rate[k])).collect();
-        let ahead = WindUp::forced(&drive, &inertia, None, &coupling, 2e-3, Some(&seen));
+        let ahead = link.wind_up(Some(&seen));
         let static_angle = 3.0 / coupling.stiffness;
         let off = |ahead: &WindUp, k: usize| (ahead.angle[k] - truth.angle[k]).abs() / static_angle;
         assert!((0..25).all(|k| off(&ahead, k) < 0.05), "{}", off(&ahead, 0));
-        let blind = WindUp::forced(&drive, &inertia, None, &coupling, 2e-3, None);
+        let blind = link.wind_up(None);
         assert!(off(&blind, 0) > 0.9, "at rest under its load it would begin wound");
     }
 
@@ -311,7 +322,8 @@ mod tests {
     fn a_link_that_falls_faster_than_its_spring_holds_stays_finite() {
         let coupling = Coupling { stiffness: 10.0, damping: 0.0, half_gap: 0.0 };
         let (drive, inertia, slope) = (vec![1.0; 5000], vec![0.1; 5000], vec![-1000.0; 5000]);
-        let ahead = WindUp::forced(&drive, &inertia, Some(&slope), &coupling, 2e-3, None);
+        let link = Oscillator { drive: &drive, inertia: &inertia, slope: Some(&slope), coupling, dt: 2e-3 };
+        let ahead = link.wind_up(None);
         assert!(ahead.angle.iter().chain(&ahead.acceleration).all(|x| x.abs() < 1e7));
         assert!(ahead.angle.iter().any(|x| x.abs() > 1.0));
     }

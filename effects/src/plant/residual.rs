@@ -3,7 +3,7 @@
 use super::Plant;
 use crate::Motion;
 use crate::filter::{bristle, first_order, late};
-use crate::wind_up::{Coupling, JointRun, WindUp, inertia_about, slope_about};
+use crate::wind_up::{Coupling, JointRun, Oscillator, WindUp, inertia_about, slope_about};
 
 /// What one sample needs to know beyond itself.
 #[derive(Default)]
@@ -148,7 +148,9 @@ impl Plant {
                 let ahead = if self.motor_encoders {
                     let inertia = inertia_about(&self.model, &mut self.data, motion, j);
                     let slope = slope_about(&self.model, &mut self.data, motion, j);
-                    WindUp::forced(&taken, &inertia, Some(&slope), &coupling, motion.dt, Some(&turning))
+                    let slope = Some(&slope[..]);
+                    let link = Oscillator { drive: &taken, inertia: &inertia, slope, coupling, dt: motion.dt };
+                    link.wind_up(Some(&turning))
                 } else {
                     WindUp::of_motor(&turning, &taken, rotor, &coupling, motion.dt)
                 };

@@ -312,6 +312,7 @@ fn predicted(
         a: &a,
         tau: &nominal,
         nominal: &nominal,
+        load: &nominal,
         held: None,
         dt,
         start: 0.0,

@@ -106,8 +106,21 @@ impl Data<'_> {
             .collect()
     }
 
+    /// The signals, their gears loaded by the torque that the plant takes with the effects of a fit.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn loaded(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Signals>, EffectError> {
+        let less = |(tau, rest): (&Vec<f64>, &Vec<f64>)| tau.iter().zip(rest).map(|(tau, rest)| tau - rest).collect();
+        let loaded = |(s, rest): (&Signals, &Vec<Vec<f64>>)| Signals {
+            load: Some(s.tau.iter().zip(rest).map(less).collect()),
+            ..s.clone()
+        };
+        Ok(self.signals.iter().zip(&self.rest(problem, fit)?).map(loaded).collect())
+    }
+
     /// The problem of some candidates alone, linear about the parameters that fit best, and the fit (Gauss–Newton in the
-    /// knobs, chords in what else bends).
+    /// knobs, chords in what else bends; friction under load about the load that the plant takes with all its effects).
     ///
     /// # Errors
     /// An effect that the robot cannot have.
@@ -117,11 +130,14 @@ impl Data<'_> {
         let mut curvature: Option<Vec<Vec<Vec<f64>>>> = None;
         let bends = candidates.iter().any(|c| BENT.contains(&c.kind));
         let least = if bends { ROUNDS_FOR_BENT } else { 1 };
+        let loads = candidates.iter().any(|c| c.kind == Kind::LoadDependentFriction);
+        let mut loaded: Option<Vec<Signals>> = None;
         let mut round = 0;
         loop {
-            let mut problem = self.problem(terms.clone(), &Kind::ALL);
+            let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
+            let mut problem = data.problem(terms.clone(), &Kind::ALL);
             if let Some(curvature) = &curvature {
-                problem.bend(self.signals, self.band, self.standstill, curvature);
+                problem.bend(data.signals, self.band, self.standstill, curvature);
             }
             let fit = Fit::on_all(&problem, &set);
             let mut change = 0.0f64;
@@ -147,20 +163,24 @@ impl Data<'_> {
                 }
             }
             if round >= ROUNDS || (round >= least && change < SETTLED) {
-                self.break_away(&mut problem, &fit)?;
+                data.break_away(&mut problem, &fit)?;
                 return Ok((problem, fit));
             }
             let mut at = fit.clone();
             if change > 0.0 {
                 // Curvature belongs to the knobs as they will be.
                 problem =
-                    self.problem(terms.iter().map(|t| Term { tangent_at: None, ..t.clone() }).collect(), &Kind::ALL);
+                    data.problem(terms.iter().map(|t| Term { tangent_at: None, ..t.clone() }).collect(), &Kind::ALL);
                 if let Some(curvature) = &curvature {
-                    problem.bend(self.signals, self.band, self.standstill, curvature);
+                    problem.bend(data.signals, self.band, self.standstill, curvature);
                 }
                 at = Fit::on_all(&problem, &set);
             }
-            curvature = Some(self.curvature(&problem, &at)?);
+            if loads {
+                loaded = Some(self.loaded(&problem, &at)?);
+            }
+            let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
+            curvature = Some(data.curvature(&problem, &at)?);
             round += 1;
         }
     }

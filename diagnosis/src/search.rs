@@ -8,7 +8,8 @@ use crate::estimate::Fit;
 use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
 use crate::limits;
-use crate::problem::{Problem, Term};
+use crate::problem::{Entry, Problem, Term};
+use crate::refine::Data;
 use crate::screen;
 use crate::select::{self, Choice};
 use crate::signals::Signals;
@@ -39,6 +40,17 @@ const BETTER: f64 = 0.95;
 const ROUNDS: usize = 4;
 /// Kinds that with many coefficients, or with one for all that a joint carries, can promise more than they keep.
 const INERTIAL: [Kind; 4] = [Kind::Payload, Kind::LinkInertiaError, Kind::GravityMisalignment, Kind::TorqueGainError];
+
+/// Friction, which a choice does not count as load: where it rules, the load would have the sign of the speed.
+const FRICTION: [Kind; 7] = [
+    Kind::ViscousFriction,
+    Kind::CoulombFriction,
+    Kind::StribeckFriction,
+    Kind::PreslidingFriction,
+    Kind::ThermalDrift,
+    Kind::LoadDependentFriction,
+    Kind::JointCoupling,
+];
 
 /// Kinds that a first look may have taken for a drive that turns on its own; the rotor is part of it.
 const STANDS_IN: [Kind; 9] = [
@@ -408,7 +420,15 @@ impl Logs<'_> {
             if round == ROUNDS || choice.set.is_empty() {
                 return Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt: None });
             }
-            all.replace(self.model, &self.signals, &self.band, &self.still, &changes);
+            // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
+            let is = |kinds: &[Kind], entry: &Entry| kinds.contains(&entry.candidate.kind);
+            let loads = fit.set.iter().copied().filter(|&c| !is(&FRICTION, &exact.entries[c])).collect();
+            let loaded = data.loaded(&exact, &Fit { set: loads, ..fit.clone() })?;
+            let data = Data { signals: &loaded, ..data };
+            let under_load = all.entries.iter().enumerate().filter(|(_, e)| is(&[Kind::LoadDependentFriction], e));
+            let changes: Vec<(usize, Candidate)> =
+                under_load.map(|(c, e)| (c, e.candidate.clone())).chain(changes).collect();
+            all.replace(self.model, &loaded, &self.band, &self.still, &changes);
             let at: Vec<usize> = (0..exact.entries.len()).collect();
             let plain = data.problem(exact.entries.iter().map(|e| open(&e.candidate)).collect(), &Kind::ALL);
             let mut plain_fit = Fit::on_all(&plain, &at);

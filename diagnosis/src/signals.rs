@@ -49,6 +49,8 @@ pub struct Signals {
     pub tau_rate: Vec<Vec<f64>>,
     /// Torque of the nominal robot on this motion, damping and friction of its URDF included, N m or N.
     pub nominal: Vec<Vec<f64>>,
+    /// Torque that loads the gears, N m or N, where it is known better than from the nominal robot.
+    pub load: Option<Vec<Vec<f64>>>,
     /// Standard deviation of the white noise of each joint's position, rad or m.
     pub position_noise: Vec<f64>,
     /// Standard deviation of the noise of each joint's velocity, rad/s or m/s.
@@ -114,6 +116,7 @@ impl Signals {
             tau,
             tau_rate,
             nominal: vec![Vec::with_capacity(length); n],
+            load: None,
             position_noise,
             velocity_noise,
             effort_noise,
@@ -155,6 +158,7 @@ impl Signals {
             a: &self.a,
             tau: &self.tau,
             nominal: &self.nominal,
+            load: self.load.as_ref().unwrap_or(&self.nominal),
             held: Some(Held {
                 effort: &self.effort,
                 first: self.first - self.held.len() / 2,

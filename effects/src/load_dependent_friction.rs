@@ -45,11 +45,12 @@ impl Law for LoadDependentFriction {
 /// A gear that loses more than this locks itself.
 const SELF_LOCKING: f64 = 0.9;
 
-/// One column: the size of the torque that the nominal robot takes, times the sign of the speed. Coefficient: μ, to first
-/// order. Not the size of the measured effort: where friction is most of the effort, that would explain itself with μ = 1.
+/// One column: the size of the torque that is predicted to load the gear, times the sign of the speed. Coefficient: μ, to
+/// first order. Not the size of the measured effort: where friction is most of the effort, that would explain itself with
+/// μ = 1.
 pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     let standstill = motion.standstill[joint];
     let load = |(v, tau): (&f64, &f64)| tau.abs() * soft_sign(*v, standstill);
-    let column = Column::on(joint, motion.v[joint].iter().zip(&motion.nominal[joint]).map(load).collect(), 0.0);
+    let column = Column::on(joint, motion.v[joint].iter().zip(&motion.load[joint]).map(load).collect(), 0.0);
     vec![Column { at_most: SELF_LOCKING, ..column }]
 }

@@ -20,6 +20,8 @@ pub struct Motion<'a> {
     pub tau: &'a [Vec<f64>],
     /// Torque that this motion takes of the nominal robot, damping and friction of its URDF included, N m or N.
     pub nominal: &'a [Vec<f64>],
+    /// Torque that loads the gears, N m or N: the nominal one, or where it is known better what the plant takes with its effects.
+    pub load: &'a [Vec<f64>],
     /// What `tau` was made from; `None` where it is the effort itself.
     pub held: Option<Held<'a>>,
     /// Time from one sample to the next, s.

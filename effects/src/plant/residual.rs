@@ -1,5 +1,6 @@
 //! What a plant leaves of a measured motion: the effort that was logged less the effort that the plant would have logged.
 
+use super::Direction;
 use super::Plant;
 use crate::Motion;
 use crate::filter::{bristle, first_order, late};
@@ -201,31 +202,42 @@ impl Plant {
             let limit = bound.max(0.0);
             if speed.abs() >= band { bound * speed.signum() } else { hold.clamp(-limit, limit) }
         };
-        for direction in &self.directions {
-            let speed = direction.along(v);
-            let band: f64 = direction.parts.iter().map(|&(j, weight)| weight.abs() * standstill[j]).sum();
-            let square: f64 = direction.parts.iter().map(|&(_, weight)| weight * weight).sum();
-            let bound = if speed.abs() >= band {
-                direction.unloaded_bound(speed, past.time)
-            } else {
-                direction.bound(speed, past.time, &s.delivered)
-            };
-            let force = sliding(bound, speed, band, direction.along(residual) / square);
-            for &(j, weight) in &direction.parts {
-                residual[j] -= weight * force;
-            }
-        }
         for (i, b) in self.bristles.iter().enumerate() {
             residual[b.joint] -= match past.bristles {
                 Some(bent) => b.coulomb * bent[i],
                 None => sliding(b.coulomb, v[b.joint], standstill[b.joint], residual[b.joint]),
             };
         }
+        // What stands holds what all that slides leaves.
+        let band = |direction: &Direction| -> f64 {
+            direction.parts.iter().map(|&(j, weight)| weight.abs() * standstill[j]).sum()
+        };
+        let stands = |direction: &Direction| direction.along(v).abs() < band(direction);
+        let held = |j: usize| {
+            let joins = |d: &&Direction| d.parts.len() > 1 && d.parts.iter().any(|&(of, _)| of == j);
+            self.directions.iter().filter(joins).any(stands)
+        };
+        for standing in [false, true] {
+            for direction in self.directions.iter().filter(|d| stands(d) == standing) {
+                let speed = direction.along(v);
+                let square: f64 = direction.parts.iter().map(|&(_, weight)| weight * weight).sum();
+                let loaded = standing || (direction.load > 0.0 && held(direction.parts[0].0));
+                let bound = if loaded {
+                    direction.bound(speed, past.time, &s.delivered)
+                } else {
+                    direction.unloaded_bound(speed, past.time)
+                };
+                let force = sliding(bound, speed, band(direction), direction.along(residual) / square);
+                for &(j, weight) in &direction.parts {
+                    residual[j] -= weight * force;
+                }
+            }
+        }
         // Friction that grows with the load takes its part of the effort that overcomes all else: from the effort predicted,
         // not from the one measured, which with μ = 1 would explain itself.
         for direction in self.directions.iter().filter(|d| d.load > 0.0) {
             let (&[(j, _)], speed) = (direction.parts.as_slice(), direction.along(v)) else { continue };
-            if speed.abs() >= standstill[j] {
+            if speed.abs() >= standstill[j] && !held(j) {
                 let needed = s.delivered[j] - residual[j];
                 residual[j] = s.delivered[j] - needed / (1.0 - direction.load * speed.signum() * needed.signum());
             }

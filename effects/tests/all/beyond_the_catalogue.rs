@@ -39,6 +39,7 @@ impl Run {
             a,
             tau: v,
             nominal: v,
+            load: v,
             held: None,
             dt: DT,
             start: 0.0,

@@ -241,6 +241,7 @@ fn left_of_a_log(effects: &[Effect], motor: bool) -> (f64, f64) {
         a: &a,
         tau: &tau,
         nominal: &q,
+        load: &q,
         held: None,
         dt: DT,
         start: 0.0,

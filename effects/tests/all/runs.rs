@@ -51,6 +51,7 @@ impl Run {
             a,
             tau,
             nominal,
+            load: nominal,
             held: None,
             dt: DT,
             start: 0.5,

@@ -54,7 +54,20 @@ impl Samples {
 
     fn motion<'a>(&'a self, model: &'a Model) -> Motion<'a> {
         let (q, v, a, tau, nominal) = (&self.q, &self.v, &self.a, &self.tau, &self.nominal);
-        Motion { model, q, v, a, tau, nominal, held: None, dt: DT, start: 0.0, pushed: &[], standstill: &self.still }
+        Motion {
+            model,
+            q,
+            v,
+            a,
+            tau,
+            nominal,
+            load: nominal,
+            held: None,
+            dt: DT,
+            start: 0.0,
+            pushed: &[],
+            standstill: &self.still,
+        }
     }
 
     /// Residual of a plant at every sample, joint-major.

@@ -1,22 +1,70 @@
 //! Friction that grows with the load, where dry friction outweighs all else that a joint does.
 
 use gapscope_datasets::{Recipe, generate};
-use gapscope_effects::{CoulombFriction, Effect, LoadDependentFriction};
+use gapscope_diagnosis::schema::{Diagnosis, Verdict};
+use gapscope_dynamics::Model;
+use gapscope_effects::{Armature, CoulombFriction, Effect, JointCoupling, LoadDependentFriction, PreslidingFriction};
 use gapscope_tests::{diagnose, robot};
+use std::collections::BTreeMap;
+
+/// Values on the joints from the `first` on.
+fn on(model: &Model, first: usize, values: &[f64]) -> BTreeMap<String, f64> {
+    model.joints()[first..].iter().map(|j| j.name.clone()).zip(values.iter().copied()).collect()
+}
+
+fn diagnosed(model: &Model, effects: &[Effect], seeds: std::ops::Range<u64>) -> Diagnosis {
+    let log = |seed| generate(model, effects, seed, &Recipe::default(), "log.csv").unwrap();
+    diagnose(model, &seeds.map(log).collect::<Vec<_>>()).diagnosis
+}
+
+fn kinds(diagnosis: &Diagnosis) -> Vec<&str> {
+    let mut kinds: Vec<&str> = diagnosis.effects.iter().map(|e| e.kind.as_str()).collect();
+    kinds.sort_unstable();
+    kinds
+}
+
+/// The sixth joint carries next to nothing: its friction grows with what its rotor takes.
+#[test]
+fn the_gear_of_a_light_joint_is_loaded_by_its_rotor() {
+    let model = robot("arm6");
+    let effects = [
+        Effect::Armature(Armature { armature: on(&model, 5, &[0.02]) }),
+        Effect::LoadDependentFriction(LoadDependentFriction { load_coefficient: on(&model, 0, &[0.12; 6]) }),
+    ];
+    let diagnosis = diagnosed(&model, &effects, 1..4);
+    assert_eq!(kinds(&diagnosis), ["armature", "load_dependent_friction"], "{:#?}", diagnosis.effects);
+    let friction = diagnosis.effects.iter().find(|e| e.kind == "load_dependent_friction").unwrap();
+    assert!(friction.joints.contains(&"joint6".to_owned()), "{friction:#?}");
+    assert_eq!(diagnosis.verdict, Verdict::Explained);
+}
+
+/// A bristle bears what friction under load need not hold at rest; a coupling that stands holds what is left by joints that slide.
+#[test]
+fn friction_that_stands_holds_what_all_else_leaves() {
+    let model = robot("double_pendulum");
+    let load = Effect::LoadDependentFriction(LoadDependentFriction { load_coefficient: on(&model, 0, &[0.12; 2]) });
+    let bristles = Effect::PreslidingFriction(PreslidingFriction {
+        coulomb: on(&model, 0, &[0.3, 0.2]),
+        bristle_stiffness: on(&model, 0, &[12.0, 8.0]),
+    });
+    let joints = [0, 1].map(|j: usize| model.joints()[j].name.clone());
+    let coupling =
+        Effect::JointCoupling(JointCoupling { joints, ratio: 1.0, coulomb: 0.3, viscous: 0.05, armature: 0.0 });
+    for (other, name) in [(bristles, "presliding_friction"), (coupling, "joint_coupling")] {
+        let diagnosis = diagnosed(&model, &[load.clone(), other], 1..4);
+        assert!(kinds(&diagnosis).contains(&name), "{:#?}", diagnosis.effects);
+        assert!(kinds(&diagnosis).contains(&"load_dependent_friction"), "{:#?}", diagnosis.effects);
+        assert!(diagnosis.unexplained.fraction < 1e-3, "{name}: {}", diagnosis.unexplained.fraction);
+    }
+}
 
 #[test]
 fn load_friction_in_a_wrist_is_no_torque_gain() {
     let model = robot("arm6");
-    let on = |values: &[f64]| model.joints().iter().map(|j| j.name.clone()).zip(values.iter().copied()).collect();
     let effects = [
-        Effect::CoulombFriction(CoulombFriction { coulomb: on(&[0.186, 4.97, 0.9, 0.18, 0.48, 0.05]) }),
-        Effect::LoadDependentFriction(LoadDependentFriction { load_coefficient: on(&[0.0735; 5]) }),
+        Effect::CoulombFriction(CoulombFriction { coulomb: on(&model, 0, &[0.186, 4.97, 0.9, 0.18, 0.48, 0.05]) }),
+        Effect::LoadDependentFriction(LoadDependentFriction { load_coefficient: on(&model, 0, &[0.0735; 5]) }),
     ];
-    // On about half of such logs the refinement of load friction does not come near enough, and the gain stays.
-    let logs: Vec<_> =
-        (9..13).map(|seed| generate(&model, &effects, seed, &Recipe::default(), "log.csv").unwrap()).collect();
-    let found = diagnose(&model, &logs).diagnosis.effects;
-    let mut kinds: Vec<&str> = found.iter().map(|e| e.kind.as_str()).collect();
-    kinds.sort_unstable();
-    assert_eq!(kinds, ["coulomb_friction", "load_dependent_friction"], "{found:#?}");
+    let diagnosis = diagnosed(&model, &effects, 9..13);
+    assert_eq!(kinds(&diagnosis), ["coulomb_friction", "load_dependent_friction"], "{:#?}", diagnosis.effects);
 }

@@ -18,7 +18,7 @@ use crate::schema::*;
 use crate::search::Chosen;
 use crate::select::{self, Rival};
 use crate::signals::{Signals, standstill};
-use crate::verdict;
+use crate::verdict::{self, Judged};
 use gapscope_datasets::{Episode, Trajectory};
 use gapscope_dynamics::{Joint, Model};
 use gapscope_effects::{Candidate, Effect, EffectError, EncoderSide, Kind, Plant};
@@ -239,9 +239,14 @@ impl Logs<'_> {
 
     /// Held-out gap of a set, as a part of the effort's variation, beside what laws outside the catalogue in it account for.
     pub(crate) fn left(&self, problem: &Problem, set: &[usize]) -> Result<f64, EffectError> {
-        let rows = self.beside_outside(problem, set, &self.held_out(problem, set, false)?.rows);
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
-        Ok(gap::weighted_rms(&gap::total(&gap::squares(&self.band, &rows, |_| true)), &weights))
+        Ok(gap::weighted_rms(&self.left_by_joint(problem, set)?, &weights))
+    }
+
+    /// The same as sums of squares a joint, (N m)² or N², and the count of rows.
+    pub(crate) fn left_by_joint(&self, problem: &Problem, set: &[usize]) -> Result<Vec<f64>, EffectError> {
+        let rows = self.beside_outside(problem, set, &self.held_out(problem, set, false)?.rows);
+        Ok(gap::total(&gap::squares(&self.band, &rows, |_| true)))
     }
 
     /// Held-out residuals of a set less what laws outside the catalogue in it account for.
@@ -268,20 +273,14 @@ impl Logs<'_> {
         rows
     }
 
-    /// What the rest is like, by the laws outside the catalogue in a set; `after` with them taken for known is `beside`.
-    fn resembles(
-        &self,
-        problem: &Problem,
-        set: &[usize],
-        after: verdict::Judged,
-        beside: verdict::Judged,
-    ) -> Option<Resemblance> {
+    /// What the rest is like, by the laws outside the catalogue in a set; the unexplained fraction `after` is `beside` with
+    /// them taken for known.
+    fn resembles(&self, problem: &Problem, set: &[usize], after: f64, beside: f64) -> Option<Resemblance> {
         let mut laws: BTreeMap<Kind, Vec<usize>> = BTreeMap::new();
         for candidate in problem.outside(set).into_iter().map(|c| &problem.entries[c].candidate) {
             laws.entry(candidate.kind).or_default().extend(&candidate.joints);
         }
-        let rest = after.unexplained_fraction();
-        (!laws.is_empty() && rest > 0.0).then(|| Resemblance {
+        (!laws.is_empty() && after > 0.0).then(|| Resemblance {
             laws: laws
                 .into_iter()
                 .map(|(law, joints)| {
@@ -290,7 +289,7 @@ impl Logs<'_> {
                     Lookalike { law: law.name().to_owned(), joints }
                 })
                 .collect(),
-            share: (1.0 - beside.unexplained_fraction() / rest).clamp(0.0, 1.0),
+            share: (1.0 - beside / after).clamp(0.0, 1.0),
         })
     }
 
@@ -354,19 +353,18 @@ impl Logs<'_> {
         }
         let blocks = |rows: &Rows| gap::squares(&self.band, rows, counts);
         let calm = gap::calm(&blocks(&after.rows), &concern, &chatters);
-        let size = |rows: &Rows| {
+        let sums = |rows: &Rows| {
             let calm: Vec<Vec<f64>> =
                 blocks(rows).into_iter().zip(&calm).filter(|(_, calm)| **calm).map(|(b, _)| b).collect();
-            gap::weighted_rms(&gap::total(&calm), &concern)
+            gap::total(&calm)
         };
-        let floor_of_concern = gap::weighted_floor(&floor, &concern);
-        let judged = verdict::Judged { before: size(&before.rows), after: size(&after.rows), floor: floor_of_concern };
+        let judged = |after: &Rows| Judged::new(&sums(&before.rows), &sums(after), &floor, &concern);
+        let beside = judged(&self.beside_outside(problem, &fit.set, &after.rows));
+        let judged = judged(&after.rows);
         let unexplained = judged.unexplained_fraction();
         let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());
         // What a law outside the catalogue accounts for does not speak against the effects beside it.
-        let beside = self.beside_outside(problem, &fit.set, &after.rows);
-        let beside = verdict::Judged { after: size(&beside), ..judged };
-        let misfit = if verdict == Verdict::Explained { 0.0 } else { beside.unexplained_fraction() };
+        let misfit = (verdict != Verdict::Explained).then_some(&beside);
         let found = self.found_effects(chosen, rivals, &torque, misfit, &weights)?;
         let corrected = Corrected {
             schema: MODEL_SCHEMA.to_owned(),
@@ -408,7 +406,7 @@ impl Logs<'_> {
             unexplained: Unexplained {
                 fraction: unexplained,
                 learnable,
-                resembles: self.resembles(problem, &fit.set, judged, beside),
+                resembles: self.resembles(problem, &fit.set, unexplained, beside.unexplained_fraction()),
                 regimes: left,
             },
             shrink: Shrink {
@@ -431,7 +429,7 @@ impl Logs<'_> {
         chosen: &Chosen,
         rivals: &[Rival],
         torque: &Change,
-        misfit: f64,
+        misfit: Option<&Judged>,
         weights: &[f64],
     ) -> Result<Vec<FoundEffect>, EffectError> {
         let (problem, fit) = (&chosen.exact, &chosen.fit);
@@ -462,6 +460,9 @@ impl Logs<'_> {
             if late.is_some_and(|doubt| doubt > INDISTINGUISHABLE) {
                 confused.extend(select::LATE.iter().filter(|other| **other != kind).map(|k| k.name().to_owned()));
             }
+            // What other joints leave says nothing against it.
+            let joints: Vec<usize> = own.iter().flat_map(|&c| problem.entries[c].candidate.joints.clone()).collect();
+            let misfit = misfit.map_or(0.0, |judged| judged.unexplained_of(&joints));
             let loss = rival.map_or(0.0, |r| r.choice.blocks.iter().sum::<f64>());
             found.push((
                 loss,

@@ -98,6 +98,11 @@ pub fn weighted_rms(sums: &[f64], weights: &[f64]) -> f64 {
     (weights.iter().zip(sums).map(|(w, s)| w * w * s / count).sum::<f64>() / used).sqrt()
 }
 
+/// The weights of one joint alone.
+pub fn of_joint(weights: &[f64], joint: usize) -> Vec<f64> {
+    weights.iter().enumerate().map(|(j, w)| if j == joint { *w } else { 0.0 }).collect()
+}
+
 /// The same of noise floors, one a joint, N m or N.
 pub fn weighted_floor(floor: &[f64], weights: &[f64]) -> f64 {
     let squares: Vec<f64> = floor.iter().map(|f| f * f).chain([1.0]).collect();

@@ -6,14 +6,14 @@ use crate::diagnose::{Logs, Progress};
 use crate::drive::NOTHING;
 use crate::estimate::Fit;
 use crate::floor::noise_floor;
-use crate::gap::{self, Rows};
+use crate::gap;
 use crate::limits;
 use crate::problem::{Entry, Problem, Term};
 use crate::refine::Data;
 use crate::screen;
 use crate::select::{self, Choice};
 use crate::signals::Signals;
-use crate::verdict;
+use crate::verdict::{Judged, Level};
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, EffectError, Kind, Plant, Range};
 use rayon::prelude::*;
@@ -38,8 +38,16 @@ const IN_NOISE: f64 = 3.3;
 const BETTER: f64 = 0.95;
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
-/// Kinds that with many coefficients, or with one for all that a joint carries, can promise more than they keep.
-const INERTIAL: [Kind; 4] = [Kind::Payload, Kind::LinkInertiaError, Kind::GravityMisalignment, Kind::TorqueGainError];
+/// Kinds that reach joints where they find nothing to explain, or with one coefficient for all that a joint carries can
+/// promise more than they keep.
+const REACHING: [Kind; 6] = [
+    Kind::Payload,
+    Kind::LinkInertiaError,
+    Kind::GravityMisalignment,
+    Kind::TorqueGainError,
+    Kind::ActuationDelay,
+    Kind::ActuatorLag,
+];
 
 /// Friction, which a choice does not count as load: where it rules, the load would have the sign of the speed.
 const FRICTION: [Kind; 7] = [
@@ -98,6 +106,8 @@ struct Tried {
     kinds: Vec<Kind>,
     /// Held-out gap with it, as a part of the effort's variation.
     left: f64,
+    /// The same against the noise, of all joints and of each.
+    judged: Judged,
 }
 
 /// A drive that turns on its own.
@@ -122,21 +132,20 @@ impl Logs<'_> {
     /// the gap larger is no explanation: then the next choice does without the kinds that promise most.
     pub(crate) fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
-        let rms = |rows: &Rows| gap::weighted_rms(&gap::total(&gap::squares(&self.band, rows, |_| true)), &weights);
-        let before = rms(&self.nominal_rows());
+        let before = gap::total(&gap::squares(&self.band, &self.nominal_rows(), |_| true));
         // What the set leaves, beside what laws outside the catalogue in it account for.
         let tried = |chosen: Chosen| -> Result<Tried, EffectError> {
-            let left = self.left(&chosen.exact, &chosen.fit.set)?;
-            Ok(Tried { kinds: select::kinds(&chosen.exact, &chosen.fit.set), left, chosen })
+            let after = self.left_by_joint(&chosen.exact, &chosen.fit.set)?;
+            let judged = Judged::new(&before, &after, &chosen.noise, &weights);
+            Ok(Tried { kinds: select::kinds(&chosen.exact, &chosen.fit.set), left: judged.all.after, judged, chosen })
         };
         let without = |kinds: &[Kind]| -> Result<Tried, EffectError> {
             tried(self.choose_among(&[kinds, &Kind::OUTSIDE].concat(), progress)?)
         };
         let mut best = without(&[])?;
-        let floor = gap::weighted_floor(&best.chosen.noise, &weights);
-        let judged = |tried: &Tried| verdict::Judged { before, after: tried.left, floor };
+        let floor = best.judged.all.floor;
         let beyond = |tried: &Tried| (tried.left.powi(2) - floor.powi(2)).max(0.0).sqrt();
-        if judged(&best).leaves_much() {
+        if best.judged.leaves_much() {
             // Rows beyond a limit that is reached now and then pass for outliers, unless limits have a say in that.
             let weighed_by = [weighing(), vec![Kind::TorqueSaturation]].concat();
             let limited = self.best_of(&Kind::OUTSIDE, &weighed_by, progress)?;
@@ -146,7 +155,7 @@ impl Logs<'_> {
         let every = best.chosen.all.clone();
         let flexible: Vec<Kind> = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k)).collect();
         let bends = best.kinds.iter().any(|kind| flexible.contains(kind));
-        if bends && (best.kinds.len() >= MANY || judged(&best).leaves_much()) {
+        if bends && (best.kinds.len() >= MANY || best.judged.leaves_much()) {
             let linear = without(&flexible)?;
             if linear.left <= best.left && linear.kinds.len() <= best.kinds.len() {
                 // One kind may have spoilt the others: each in turn does without.
@@ -159,7 +168,7 @@ impl Logs<'_> {
                 }
             }
         }
-        if judged(&best).leaves_any()
+        if best.judged.leaves_any()
             && let Some(sticking) = self.sticking(&best.chosen, every)?
         {
             let sticking = tried(sticking)?;
@@ -167,23 +176,23 @@ impl Logs<'_> {
         }
         let mut open = None;
         let mut laws = None;
-        if judged(&best).leaves_any() && best.left > UNNOTICED {
+        if best.judged.leaves_any() && best.left > UNNOTICED {
             let found = tried(self.choose_among(&[], progress)?)?;
             laws = Some(found.chosen.all.clone());
             open = Some(found).filter(|open| beyond(open) < OPEN * beyond(&best));
         }
-        let much = judged(&best).leaves_much();
+        let much = best.judged.leaves_much();
         // Joints whose drive is worth a look: all where anything is left, and else those whose rotor was found, which is a
         // part of such a drive.
         let drives = |tried: &Tried| -> Vec<usize> {
             let stands_in = tried.kinds.iter().any(|kind| STANDS_IN.contains(kind));
-            let explained_otherwise = stands_in && judged(tried).unexplained_fraction() > ALL_BUT;
-            let all = tried.left > UNNOTICED && (judged(tried).leaves_any() || explained_otherwise);
+            let explained_otherwise = stands_in && tried.judged.unexplained_fraction() > ALL_BUT;
+            let all = tried.left > UNNOTICED && (tried.judged.leaves_any() || explained_otherwise);
             let rotors = tried.chosen.exact.entries.iter().filter(|e| e.candidate.kind == Kind::Armature);
             let rotors: Vec<usize> = rotors.flat_map(|e| e.candidate.joints.iter().copied()).collect();
             (0..self.model.dof()).filter(|j| self.moving[*j] && (all || rotors.contains(j))).collect()
         };
-        if open.as_ref().is_none_or(|open| judged(open).leaves_any()) {
+        if open.as_ref().is_none_or(|open| open.judged.leaves_any()) {
             let joints = drives(&best);
             best = tried(self.drive(best.chosen, &joints, progress)?)?;
         }
@@ -193,7 +202,7 @@ impl Logs<'_> {
         }
         // What such a drive covered has its turn beside it.
         if let (Some(laws), Some(turned)) = (laws, &best.chosen.turned)
-            && judged(&best).leaves_any()
+            && best.judged.leaves_any()
             && best.left > UNNOTICED
             && let Some(beside) = self.beside(&best.chosen, turned, laws, progress)?
         {
@@ -202,14 +211,16 @@ impl Logs<'_> {
             open = if beyond(&beside) < least { Some(beside) } else { open };
         }
         if let Some(open) = open.filter(|open| open.left < best.left) {
-            return if much { self.constant(open.chosen) } else { Ok(open.chosen) };
+            // Beside laws that leave nothing but noise, noise is all that could tell an effect from itself.
+            let doubt = much && open.judged.leaves_any();
+            return self.constant(open.chosen, |_| doubt);
         }
-        if best.kinds.is_empty() || best.left < before {
-            return if judged(&best).leaves_most() { self.constant(best.chosen) } else { Ok(best.chosen) };
+        if best.kinds.is_empty() || !best.judged.spoils() {
+            return self.constant(best.chosen, |candidate| best.judged.doubts(&candidate.joints));
         }
-        let modest = without(&INERTIAL)?;
-        if modest.kinds.is_empty() || modest.left < before {
-            return Ok(modest.chosen);
+        let modest = without(&REACHING)?;
+        if modest.kinds.is_empty() || !modest.judged.spoils() {
+            return self.constant(modest.chosen, |candidate| modest.judged.doubts(&candidate.joints));
         }
         let choice = select::evaluate(&modest.chosen.all, Vec::new());
         let (exact, fit) = self.data(&modest.chosen.noise).refine(&[])?;
@@ -252,10 +263,10 @@ impl Logs<'_> {
             };
             for account in self.accounts(joints, &others.0, &others.1)?.into_iter().take(ACCOUNTS) {
                 let joint = account.drive.joints[0];
-                let own: Vec<f64> = (0..weights.len()).map(|j| if j == joint { weights[j] } else { 0.0 }).collect();
+                let own = gap::of_joint(&weights, joint);
                 let rest = gap::weighted_rms(&gap::total(&before), &own);
                 let floor = gap::weighted_floor(&best.noise, &own);
-                let more_than_noise = verdict::Judged { before: rest, after: rest, floor }.leaves_any();
+                let more_than_noise = Level { before: rest, after: rest, floor }.leaves_any();
                 if !more_than_noise && account.beyond < IN_NOISE {
                     continue;
                 }
@@ -337,10 +348,13 @@ impl Logs<'_> {
         self.converge(laws, set, chosen.noise.clone(), turned, progress).map(Some)
     }
 
-    /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first.
-    fn constant(&self, mut chosen: Chosen) -> Result<Chosen, EffectError> {
-        while let Some(&(worst, _)) =
-            constancy::inconsistent(&chosen.exact, &chosen.fit, &self.signals, &self.band).first()
+    /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first, of those in doubt.
+    fn constant(&self, mut chosen: Chosen, doubt: impl Fn(&Candidate) -> bool) -> Result<Chosen, EffectError> {
+        let doubtful = |chosen: &Chosen, c: usize| doubt(&chosen.exact.entries[c].candidate);
+        while chosen.fit.set.iter().any(|&c| doubtful(&chosen, c))
+            && let Some((worst, _)) = constancy::inconsistent(&chosen.exact, &chosen.fit, &self.signals, &self.band)
+                .into_iter()
+                .find(|&(c, _)| doubtful(&chosen, c))
         {
             chosen.choice.set.remove(worst);
             let (exact, fit) =

@@ -1,5 +1,6 @@
 //! The answer in a word.
 
+use crate::gap;
 use crate::schema::Verdict;
 
 /// Fewer rows than this tell nothing.
@@ -15,9 +16,16 @@ const MATERIAL_GAP: f64 = 0.1;
 /// Effects explain the gap if they leave less than this part of its square above the floor: about a twentieth of the gap.
 const EXPLAINED: f64 = 0.003;
 
+/// A joint is spoilt where its gap is so many times what it was: beside something unknown, the right effects can make one a
+/// little larger.
+const SPOILT: f64 = 2.0;
+/// One joint alone leaves more than noise at this multiple of its floor: any of them may, by chance or by what smoothing makes
+/// of a law.
+const ALONE: f64 = 3.0;
+
 /// Weighted held-out gap before and after, and the noise floor in the same measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Judged {
+pub struct Level {
     /// Of the nominal model.
     pub before: f64,
     /// With the effects.
@@ -26,7 +34,7 @@ pub struct Judged {
     pub floor: f64,
 }
 
-impl Judged {
+impl Level {
     /// Squared gap left above the floor over the squared gap before.
     pub fn unexplained_fraction(&self) -> f64 {
         if self.before <= 0.0 {
@@ -40,16 +48,80 @@ impl Judged {
         self.after > NEAR_FLOOR * self.floor
     }
 
-    /// Whether what is left is more than noise and more than explained gaps leave.
-    pub fn leaves_much(&self) -> bool {
-        self.leaves_any()
-            && self.after > IMMATERIAL_GAP
-            && (self.unexplained_fraction() > EXPLAINED || self.after > MATERIAL_GAP)
+    /// Whether what is left is material, and more than explained gaps leave.
+    fn matters(&self) -> bool {
+        self.after > IMMATERIAL_GAP && (self.unexplained_fraction() > EXPLAINED || self.after > MATERIAL_GAP)
     }
 
-    /// Whether so much is left that something unknown of the size of what was found is about.
-    pub fn leaves_most(&self) -> bool {
-        self.leaves_much() && self.unexplained_fraction() > LARGE
+    /// Whether that is so of one joint, whatever the others do.
+    fn leaves_alone(&self) -> bool {
+        self.after > ALONE * self.floor && self.matters()
+    }
+}
+
+/// The gap of the whole robot and of each joint: what is large in one joint can be lost in the sum.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// All joints together.
+    pub all: Level,
+    /// Each joint alone.
+    pub joints: Vec<Level>,
+}
+
+impl Judged {
+    /// From sums of squares a joint, the count last, of the nominal model and with the effects, the noise floor of each joint
+    /// in its own unit, and the weights of the joints.
+    pub fn new(before: &[f64], after: &[f64], floor: &[f64], weights: &[f64]) -> Judged {
+        let level = |weights: &[f64]| Level {
+            before: gap::weighted_rms(before, weights),
+            after: gap::weighted_rms(after, weights),
+            floor: gap::weighted_floor(floor, weights),
+        };
+        let joints = (0..weights.len()).map(|j| level(&gap::of_joint(weights, j))).collect();
+        Judged { all: level(weights), joints }
+    }
+
+    /// Squared gap left above the floor over the squared gap before, all joints together.
+    pub fn unexplained_fraction(&self) -> f64 {
+        self.all.unexplained_fraction()
+    }
+
+    /// The same of some joints, or of all where there are none.
+    pub fn unexplained_of(&self, joints: &[usize]) -> f64 {
+        if joints.is_empty() {
+            return self.unexplained_fraction();
+        }
+        let size = |of: fn(&Level) -> f64| joints.iter().map(|&j| of(&self.joints[j]).powi(2)).sum::<f64>().sqrt();
+        Level { before: size(|l| l.before), after: size(|l| l.after), floor: size(|l| l.floor) }.unexplained_fraction()
+    }
+
+    /// Whether what is left is more than noise.
+    pub fn leaves_any(&self) -> bool {
+        self.all.leaves_any() || self.alone().next().is_some()
+    }
+
+    /// Whether what is left is more than noise and more than explained gaps leave.
+    pub fn leaves_much(&self) -> bool {
+        (self.all.leaves_any() && self.all.matters()) || self.alone().next().is_some()
+    }
+
+    /// Whether so much is left of the whole robot, or of one of some joints, that effects there may be what something
+    /// unknown of their size was taken for.
+    pub fn doubts(&self, joints: &[usize]) -> bool {
+        let most = |level: &Level| level.unexplained_fraction() > LARGE;
+        let alone = |&j: &usize| self.joints[j].leaves_alone() && most(&self.joints[j]);
+        (self.leaves_much() && most(&self.all)) || joints.iter().any(alone)
+    }
+
+    /// Whether the gap is no smaller than before, or that of a joint much larger: no explanation is.
+    pub fn spoils(&self) -> bool {
+        let spoilt = |joint: &Level| joint.leaves_alone() && joint.after > SPOILT * joint.before;
+        self.all.after >= self.all.before || self.joints.iter().any(spoilt)
+    }
+
+    /// Joints that leave something whatever the others do.
+    fn alone(&self) -> impl Iterator<Item = &Level> {
+        self.joints.iter().filter(|joint| joint.leaves_alone())
     }
 
     /// The answer in a word, by whether any effect was found, and whether a law outside the catalogue stands beside them.
@@ -60,5 +132,56 @@ impl Judged {
             (false, false) if !outside => Verdict::Explained,
             (false, _) => Verdict::PartlyExplained,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seven joints of equal effort, each with its gap before and after, under a floor of a thousandth.
+    fn judged(before: [f64; 7], after: [f64; 7]) -> Judged {
+        let sums = |gap: [f64; 7]| gap.iter().map(|x| x * x).chain([1.0]).collect::<Vec<f64>>();
+        Judged::new(&sums(before), &sums(after), &[1e-3; 7], &[1.0; 7])
+    }
+
+    /// The gap of one joint, all others at the floor.
+    fn one(joint: usize, gap: f64) -> [f64; 7] {
+        std::array::from_fn(|j| if j == joint { gap } else { 1e-3 })
+    }
+
+    #[test]
+    fn what_is_left_in_one_joint_is_not_lost_in_what_was_found_in_all() {
+        // A payload is gone, a spot that rubs in the fourth joint is left: a hundredth of that joint's gap, squared.
+        let spot = judged([1.0; 7], one(3, 0.1));
+        assert!(spot.unexplained_fraction() < EXPLAINED);
+        assert_eq!(spot.verdict(false, false), Verdict::PartlyExplained);
+        assert_eq!(judged([1.0; 7], one(3, 1e-3)).verdict(false, false), Verdict::Explained);
+        // Nothing was found, and six quiet joints make noise of the seventh's.
+        let alone = judged(one(3, 0.012), one(3, 0.012));
+        assert_eq!(alone.verdict(true, false), Verdict::UnknownEffect);
+        assert_eq!(judged([2e-3; 7], one(3, 2e-3)).verdict(true, false), Verdict::NoGap);
+        // What only the sum shows still counts.
+        assert_eq!(judged([0.02; 7], [0.02; 7]).verdict(true, false), Verdict::UnknownEffect);
+    }
+
+    #[test]
+    fn effects_are_doubted_on_joints_that_leave_most() {
+        let hum = judged([1.0; 7], one(4, 0.6));
+        assert!(hum.unexplained_fraction() < LARGE);
+        assert!(hum.doubts(&[4]) && hum.doubts(&[1, 4]) && !hum.doubts(&[1]) && !hum.doubts(&[]));
+        assert!((hum.unexplained_of(&[4]) - 0.36).abs() < 1e-4 && hum.unexplained_of(&[1]) == 0.0);
+        let all = judged([1.0; 7], [0.6; 7]);
+        assert!(all.doubts(&[1]) && all.doubts(&[]));
+    }
+
+    #[test]
+    fn a_set_that_spoils_a_joint_is_no_explanation() {
+        let hum = one(5, 0.9);
+        assert!(!judged(hum, one(5, 0.2)).spoils());
+        // The sixth joint is better off, the first pays for it.
+        let paid = std::array::from_fn(|j| if j == 0 { 0.1 } else { one(5, 0.2)[j] });
+        assert!(judged(hum, paid).spoils());
+        assert!(judged(hum, hum).spoils(), "no better is no explanation");
     }
 }

@@ -390,7 +390,10 @@ impl Logs<'_> {
         candidates.retain(|c| c.kind != Kind::TorqueSaturation || limits[c.joints[0]].contains(&c.shape));
         let open = Kind::OUTSIDE.iter().any(|kind| !forbidden.contains(kind));
         let outside = if open { Candidate::outside(self.model) } else { Vec::new() };
-        candidates.extend(screen::ripples(&data, &ranges, &residuals, &outside));
+        // A load on the flange can hide a ripple in each joint that bears it.
+        let loads = candidates.iter().filter(|c| c.kind == Kind::Payload);
+        let beside: Vec<Candidate> = loads.chain(&outside).cloned().collect();
+        candidates.extend(screen::ripples(&data, &ranges, &residuals, &beside));
         if open {
             candidates.extend(screen::places(&data, &ranges, &residuals, &outside));
         }

@@ -358,7 +358,8 @@ impl Logs<'_> {
                 blocks(rows).into_iter().zip(&calm).filter(|(_, calm)| **calm).map(|(b, _)| b).collect();
             gap::total(&calm)
         };
-        let judged = |after: &Rows| Judged::new(&sums(&before.rows), &sums(after), &floor, &concern);
+        let turning = problem.turning(&fit.set);
+        let judged = |after: &Rows| Judged::new(&sums(&before.rows), &sums(after), &floor, &concern, &turning);
         let beside = judged(&self.beside_outside(problem, &fit.set, &after.rows));
         let judged = judged(&after.rows);
         let unexplained = judged.unexplained_fraction();

@@ -136,7 +136,7 @@ impl Logs<'_> {
         // What the set leaves, beside what laws outside the catalogue in it account for.
         let tried = |chosen: Chosen| -> Result<Tried, EffectError> {
             let after = self.left_by_joint(&chosen.exact, &chosen.fit.set)?;
-            let judged = Judged::new(&before, &after, &chosen.noise, &weights);
+            let judged = Judged::new(&before, &after, &chosen.noise, &weights, &chosen.exact.turning(&chosen.fit.set));
             Ok(Tried { kinds: select::kinds(&chosen.exact, &chosen.fit.set), left: judged.all.after, judged, chosen })
         };
         let without = |kinds: &[Kind]| -> Result<Tried, EffectError> {

@@ -52,11 +52,6 @@ impl Level {
     fn matters(&self) -> bool {
         self.after > IMMATERIAL_GAP && (self.unexplained_fraction() > EXPLAINED || self.after > MATERIAL_GAP)
     }
-
-    /// Whether that is so of one joint, whatever the others do.
-    fn leaves_alone(&self) -> bool {
-        self.after > ALONE * self.floor && self.matters()
-    }
 }
 
 /// The gap of the whole robot and of each joint: what is large in one joint can be lost in the sum.
@@ -66,19 +61,22 @@ pub struct Judged {
     pub all: Level,
     /// Each joint alone.
     pub joints: Vec<Level>,
+    /// Whether the noise floor of each joint holds: with a drive that turns on its own a joint swings with noise in the band,
+    /// which the floor is not read from.
+    pub floored: Vec<bool>,
 }
 
 impl Judged {
     /// From sums of squares a joint, the count last, of the nominal model and with the effects, the noise floor of each joint
-    /// in its own unit, and the weights of the joints.
-    pub fn new(before: &[f64], after: &[f64], floor: &[f64], weights: &[f64]) -> Judged {
+    /// in its own unit, the weights of the joints, and which of them have drives that turn on their own.
+    pub fn new(before: &[f64], after: &[f64], floor: &[f64], weights: &[f64], turning: &[bool]) -> Judged {
         let level = |weights: &[f64]| Level {
             before: gap::weighted_rms(before, weights),
             after: gap::weighted_rms(after, weights),
             floor: gap::weighted_floor(floor, weights),
         };
         let joints = (0..weights.len()).map(|j| level(&gap::of_joint(weights, j))).collect();
-        Judged { all: level(weights), joints }
+        Judged { all: level(weights), joints, floored: turning.iter().map(|turns| !turns).collect() }
     }
 
     /// Squared gap left above the floor over the squared gap before, all joints together.
@@ -97,31 +95,35 @@ impl Judged {
 
     /// Whether what is left is more than noise.
     pub fn leaves_any(&self) -> bool {
-        self.all.leaves_any() || self.alone().next().is_some()
+        self.all.leaves_any() || self.any_alone()
     }
 
     /// Whether what is left is more than noise and more than explained gaps leave.
     pub fn leaves_much(&self) -> bool {
-        (self.all.leaves_any() && self.all.matters()) || self.alone().next().is_some()
+        (self.all.leaves_any() && self.all.matters()) || self.any_alone()
     }
 
     /// Whether so much is left of the whole robot, or of one of some joints, that effects there may be what something
     /// unknown of their size was taken for.
     pub fn doubts(&self, joints: &[usize]) -> bool {
         let most = |level: &Level| level.unexplained_fraction() > LARGE;
-        let alone = |&j: &usize| self.joints[j].leaves_alone() && most(&self.joints[j]);
-        (self.leaves_much() && most(&self.all)) || joints.iter().any(alone)
+        let one = |&j: &usize| self.alone(j) && most(&self.joints[j]);
+        (self.leaves_much() && most(&self.all)) || joints.iter().any(one)
     }
 
     /// Whether the gap is no smaller than before, or that of a joint much larger: no explanation is.
     pub fn spoils(&self) -> bool {
-        let spoilt = |joint: &Level| joint.leaves_alone() && joint.after > SPOILT * joint.before;
-        self.all.after >= self.all.before || self.joints.iter().any(spoilt)
+        let spoilt = |j: usize| self.alone(j) && self.joints[j].after > SPOILT * self.joints[j].before;
+        self.all.after >= self.all.before || (0..self.joints.len()).any(spoilt)
     }
 
-    /// Joints that leave something whatever the others do.
-    fn alone(&self) -> impl Iterator<Item = &Level> {
-        self.joints.iter().filter(|joint| joint.leaves_alone())
+    /// Whether a joint leaves more than noise and more than explained gaps leave, whatever the others do.
+    fn alone(&self, j: usize) -> bool {
+        self.floored[j] && self.joints[j].after > ALONE * self.joints[j].floor && self.joints[j].matters()
+    }
+
+    fn any_alone(&self) -> bool {
+        (0..self.joints.len()).any(|j| self.alone(j))
     }
 
     /// The answer in a word, by whether any effect was found, and whether a law outside the catalogue stands beside them.
@@ -142,7 +144,7 @@ mod tests {
     /// Seven joints of equal effort, each with its gap before and after, under a floor of a thousandth.
     fn judged(before: [f64; 7], after: [f64; 7]) -> Judged {
         let sums = |gap: [f64; 7]| gap.iter().map(|x| x * x).chain([1.0]).collect::<Vec<f64>>();
-        Judged::new(&sums(before), &sums(after), &[1e-3; 7], &[1.0; 7])
+        Judged::new(&sums(before), &sums(after), &[1e-3; 7], &[1.0; 7], &[false; 7])
     }
 
     /// The gap of one joint, all others at the floor.
@@ -161,6 +163,9 @@ mod tests {
         let alone = judged(one(3, 0.012), one(3, 0.012));
         assert_eq!(alone.verdict(true, false), Verdict::UnknownEffect);
         assert_eq!(judged([2e-3; 7], one(3, 2e-3)).verdict(true, false), Verdict::NoGap);
+        // A spring swings with noise in the band: what its joint leaves is no measure.
+        let spring = Judged { floored: (0..7).map(|j| j != 3).collect(), ..spot };
+        assert_eq!(spring.verdict(false, false), Verdict::Explained);
         // What only the sum shows still counts.
         assert_eq!(judged([0.02; 7], [0.02; 7]).verdict(true, false), Verdict::UnknownEffect);
     }

@@ -241,6 +241,15 @@ impl Problem {
         set.iter().copied().filter(|&c| self.entries[c].candidate.kind.is_outside()).collect()
     }
 
+    /// Joints whose drives turn on their own in a set.
+    pub fn turning(&self, set: &[usize]) -> Vec<bool> {
+        let mut turning = vec![false; self.joints.len()];
+        for candidate in set.iter().map(|&c| &self.entries[c].candidate).filter(|c| c.turns()) {
+            candidate.joints.iter().for_each(|&j| turning[j] = true);
+        }
+        turning
+    }
+
     /// Side of the transmission that a set takes the log to show.
     pub fn side(&self, set: &[usize]) -> EncoderSide {
         let motor = set.iter().any(|&c| self.entries[c].candidate.side == EncoderSide::Motor);

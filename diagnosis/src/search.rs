@@ -104,10 +104,14 @@ struct Tried {
     chosen: Chosen,
     /// Kinds of its set.
     kinds: Vec<Kind>,
-    /// Held-out gap with it, as a part of the effort's variation.
-    left: f64,
-    /// The same against the noise, of all joints and of each.
+    /// Held-out gap with it against the noise, as a part of the effort's variation.
     judged: Judged,
+}
+
+impl Tried {
+    fn left(&self) -> f64 {
+        self.judged.all.after
+    }
 }
 
 /// A drive that turns on its own.
@@ -137,14 +141,14 @@ impl Logs<'_> {
         let tried = |chosen: Chosen| -> Result<Tried, EffectError> {
             let after = self.left_by_joint(&chosen.exact, &chosen.fit.set)?;
             let judged = Judged::new(&before, &after, &chosen.noise, &weights, &chosen.exact.turning(&chosen.fit.set));
-            Ok(Tried { kinds: select::kinds(&chosen.exact, &chosen.fit.set), left: judged.all.after, judged, chosen })
+            Ok(Tried { kinds: select::kinds(&chosen.exact, &chosen.fit.set), judged, chosen })
         };
         let without = |kinds: &[Kind]| -> Result<Tried, EffectError> {
             tried(self.choose_among(&[kinds, &Kind::OUTSIDE].concat(), progress)?)
         };
         let mut best = without(&[])?;
         let floor = best.judged.all.floor;
-        let beyond = |tried: &Tried| (tried.left.powi(2) - floor.powi(2)).max(0.0).sqrt();
+        let beyond = |tried: &Tried| (tried.left().powi(2) - floor.powi(2)).max(0.0).sqrt();
         if best.judged.leaves_much() {
             // Rows beyond a limit that is reached now and then pass for outliers, unless limits have a say in that.
             let weighed_by = [weighing(), vec![Kind::TorqueSaturation]].concat();
@@ -157,9 +161,9 @@ impl Logs<'_> {
         let bends = best.kinds.iter().any(|kind| flexible.contains(kind));
         if bends && (best.kinds.len() >= MANY || best.judged.leaves_much()) {
             let linear = without(&flexible)?;
-            if linear.left <= best.left && linear.kinds.len() <= best.kinds.len() {
+            if linear.left() <= best.left() && linear.kinds.len() <= best.kinds.len() {
                 // One kind may have spoilt the others: each in turn does without.
-                let level = |tried: &Tried| tried.left * (1.0 + A_KIND * tried.kinds.len() as f64);
+                let level = |tried: &Tried| tried.left() * (1.0 + A_KIND * tried.kinds.len() as f64);
                 for kind in std::mem::replace(&mut best, linear).kinds {
                     let rest = without(&[kind])?;
                     if level(&rest) < level(&best) {
@@ -176,7 +180,7 @@ impl Logs<'_> {
         }
         let mut open = None;
         let mut laws = None;
-        if best.judged.leaves_any() && best.left > UNNOTICED {
+        if best.judged.leaves_any() && best.left() > UNNOTICED {
             let found = tried(self.choose_among(&[], progress)?)?;
             laws = Some(found.chosen.all.clone());
             open = Some(found).filter(|open| beyond(open) < OPEN * beyond(&best));
@@ -187,7 +191,7 @@ impl Logs<'_> {
         let drives = |tried: &Tried| -> Vec<usize> {
             let stands_in = tried.kinds.iter().any(|kind| STANDS_IN.contains(kind));
             let explained_otherwise = stands_in && tried.judged.unexplained_fraction() > ALL_BUT;
-            let all = tried.left > UNNOTICED && (tried.judged.leaves_any() || explained_otherwise);
+            let all = tried.left() > UNNOTICED && (tried.judged.leaves_any() || explained_otherwise);
             let rotors = tried.chosen.exact.entries.iter().filter(|e| e.candidate.kind == Kind::Armature);
             let rotors: Vec<usize> = rotors.flat_map(|e| e.candidate.joints.iter().copied()).collect();
             (0..self.model.dof()).filter(|j| self.moving[*j] && (all || rotors.contains(j))).collect()
@@ -196,21 +200,21 @@ impl Logs<'_> {
             let joints = drives(&best);
             best = tried(self.drive(best.chosen, &joints, progress)?)?;
         }
-        if let Some(found) = open.take_if(|open| open.left < best.left) {
+        if let Some(found) = open.take_if(|open| open.left() < best.left()) {
             let joints = drives(&found);
             open = Some(tried(self.drive(found.chosen, &joints, progress)?)?);
         }
         // What such a drive covered has its turn beside it.
         if let (Some(laws), Some(turned)) = (laws, &best.chosen.turned)
             && best.judged.leaves_any()
-            && best.left > UNNOTICED
+            && best.left() > UNNOTICED
             && let Some(beside) = self.beside(&best.chosen, turned, laws, progress)?
         {
             let beside = tried(beside)?;
             let least = open.as_ref().map_or(f64::INFINITY, beyond).min(OPEN * beyond(&best));
             open = if beyond(&beside) < least { Some(beside) } else { open };
         }
-        if let Some(open) = open.filter(|open| open.left < best.left) {
+        if let Some(open) = open.filter(|open| open.left() < best.left()) {
             // Beside laws that leave nothing but noise, noise is all that could tell an effect from itself.
             let doubt = much && open.judged.leaves_any();
             return self.constant(open.chosen, |_| doubt);

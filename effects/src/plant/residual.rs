@@ -1,7 +1,6 @@
 //! What a plant leaves of a measured motion: the effort that was logged less the effort that the plant would have logged.
 
-use super::Direction;
-use super::Plant;
+use super::{Direction, Plant};
 use crate::Motion;
 use crate::filter::{bristle, first_order, late};
 use crate::wind_up::{Coupling, JointRun, Oscillator, WindUp, inertia_about, slope_about};
@@ -208,7 +207,8 @@ impl Plant {
                 None => sliding(b.coulomb, v[b.joint], standstill[b.joint], residual[b.joint]),
             };
         }
-        // What stands holds what all that slides leaves.
+        // What stands holds what all that slides leaves. Where a coupling of joints holds some torque, what overcomes all else
+        // is not known: there friction under load goes by the effort itself.
         let band = |direction: &Direction| -> f64 {
             direction.parts.iter().map(|&(j, weight)| weight.abs() * standstill[j]).sum()
         };

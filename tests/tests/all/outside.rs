@@ -4,7 +4,7 @@
 use gapscope_datasets::{Episode, Recipe, Sensors, generate};
 use gapscope_diagnosis::schema::{Diagnosis, Verdict};
 use gapscope_dynamics::{Data, Model};
-use gapscope_effects::{Armature, Backlash, Effect, ViscousFriction};
+use gapscope_effects::{ActuationDelay, Armature, Backlash, Effect, ViscousFriction};
 use gapscope_tests::{diagnose, robot};
 use nalgebra::DMatrix;
 
@@ -33,9 +33,13 @@ fn rub(model: &Model, q: &[f64], v: &[f64]) -> Vec<f64> {
 
 /// A diagnosis of logs in which the drives also overcome a law: the motion is the same, the effort is larger.
 fn diagnosed(effects: &[Effect], law: &Law) -> Diagnosis {
+    diagnosed_with(effects, law, Sensors { position_noise: 1e-6, effort_noise: 1e-3, ..Sensors::default() })
+}
+
+/// The same with other sensors.
+fn diagnosed_with(effects: &[Effect], law: &Law, sensors: Sensors) -> Diagnosis {
     let model = robot(ROBOT);
     let n = model.dof();
-    let sensors = Sensors { position_noise: 1e-6, effort_noise: 1e-3, ..Sensors::default() };
     let recipe = Recipe { sensors, ..Recipe::default() };
     let log = |seed| -> Episode {
         let mut log = generate(&model, effects, seed, &recipe, "log.csv").unwrap();
@@ -127,4 +131,17 @@ fn a_spot_that_rubs_is_told_beside_play() {
     assert!(found.effects.iter().all(|e| e.joints == std::slice::from_ref(&first)), "{:#?}", found.effects);
     assert_eq!(found.verdict, Verdict::PartlyExplained);
     assert!(laws(&found).contains(&"rub"), "{:?}", laws(&found));
+}
+
+/// What a delay leaves beside a drag is noise alone, in which a third of the rows says little of a delay.
+#[test]
+fn a_short_delay_is_found_beside_a_drag_in_noise() {
+    let sensors = Sensors { position_noise: 1e-5, effort_noise: 5e-3, ..Sensors::default() };
+    let found = diagnosed_with(&[Effect::ActuationDelay(ActuationDelay { delay: 0.003 })], &drag, sensors);
+    assert_eq!(found.verdict, Verdict::PartlyExplained, "{:#?}", found.effects);
+    let [late] = found.effects.as_slice() else { panic!("{:#?}", found.effects) };
+    // In this noise a lag as short is as likely.
+    let named = |kind: &str| late.kind == kind || late.indistinguishable_from.iter().any(|other| other == kind);
+    assert!(named("actuation_delay"), "{late:#?}");
+    assert_eq!(laws(&found), ["link_drag"]);
 }

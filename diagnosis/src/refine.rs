@@ -7,7 +7,7 @@ use crate::estimate::Fit;
 use crate::problem::{Problem, Term};
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
-use gapscope_effects::{Candidate, EffectError, Kind, Plant};
+use gapscope_effects::{Candidate, EffectError, Kind, Motion, Plant};
 use rayon::prelude::*;
 
 /// Rounds, at most.
@@ -30,6 +30,17 @@ const SETTLED: f64 = 2e-3;
 const KNOB: (f64, f64) = (0.2, 5.0);
 /// The same for a limit: far below where it is reached it would cut away what it is to explain.
 const LIMIT: (f64, f64) = (0.8, 1.5);
+
+/// Friction does not count as load where signatures are formed: where it rules, the load would have the sign of the speed, and
+/// friction under load be any friction. The law itself counts it.
+const FRICTION: [Kind; 6] = [
+    Kind::ViscousFriction,
+    Kind::CoulombFriction,
+    Kind::StribeckFriction,
+    Kind::PreslidingFriction,
+    Kind::ThermalDrift,
+    Kind::JointCoupling,
+];
 
 /// The logs that a problem is made from.
 #[derive(Clone, Copy)]
@@ -106,21 +117,38 @@ impl Data<'_> {
             .collect()
     }
 
-    /// The signals, their gears loaded by the torque that the plant takes with the effects of a fit.
+    /// The signals, their gears loaded by the torque that the plant takes with what is no friction of a fit. It is predicted without
+    /// the measured effort, whose noise would explain itself; only play is crossed as that effort drives its rotor.
     ///
     /// # Errors
     /// An effect that the robot cannot have.
     pub fn loaded(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Signals>, EffectError> {
-        let less = |(tau, rest): (&Vec<f64>, &Vec<f64>)| tau.iter().zip(rest).map(|(tau, rest)| tau - rest).collect();
-        let loaded = |(s, rest): (&Signals, &Vec<Vec<f64>>)| Signals {
-            load: Some(s.tau.iter().zip(rest).map(less).collect()),
-            ..s.clone()
-        };
-        Ok(self.signals.iter().zip(&self.rest(problem, fit)?).map(loaded).collect())
+        let candidate = |c: usize| &problem.entries[c].candidate;
+        let (rubs, others): (Vec<usize>, Vec<usize>) =
+            fit.set.iter().copied().partition(|&c| FRICTION.contains(&candidate(c).kind));
+        let rubs: Vec<usize> = rubs.into_iter().flat_map(|c| candidate(c).joints.clone()).collect();
+        // Nor does friction under load itself beside other friction of its joint.
+        let beside = |c: usize| candidate(c).joints.iter().any(|j| rubs.contains(j));
+        let counts = |&c: &usize| candidate(c).kind != Kind::LoadDependentFriction || !beside(c);
+        let set = others.into_iter().filter(counts).collect();
+        let effects = Fit { set, ..fit.clone() }.effects(problem, self.model);
+        let side = problem.side(&fit.set);
+        let crossed = effects.iter().any(|effect| effect.kind() == Kind::Backlash);
+        self.signals
+            .par_iter()
+            .map(|s| {
+                let mut plant = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
+                let idle = || s.tau.iter().map(|tau| vec![0.0; tau.len()]).collect();
+                let tau: Vec<Vec<f64>> = if crossed { s.tau.clone() } else { idle() };
+                let rest = plant.residuals(&Motion { tau: &tau, held: None, ..s.motion(self.model, self.standstill) });
+                let less = |(tau, rest): (&Vec<f64>, &Vec<f64>)| tau.iter().zip(rest).map(|(t, r)| t - r).collect();
+                Ok(Signals { load: Some(tau.iter().zip(&rest).map(less).collect()), ..s.clone() })
+            })
+            .collect()
     }
 
     /// The problem of some candidates alone, linear about the parameters that fit best, and the fit (Gauss–Newton in the
-    /// knobs, chords in what else bends; friction under load about the load that the plant takes with all its effects).
+    /// knobs, chords in what else bends; friction under load about the load of all that is no friction).
     ///
     /// # Errors
     /// An effect that the robot cannot have.

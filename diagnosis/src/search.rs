@@ -49,17 +49,6 @@ const REACHING: [Kind; 6] = [
     Kind::ActuatorLag,
 ];
 
-/// Friction, which a choice does not count as load: where it rules, the load would have the sign of the speed.
-const FRICTION: [Kind; 7] = [
-    Kind::ViscousFriction,
-    Kind::CoulombFriction,
-    Kind::StribeckFriction,
-    Kind::PreslidingFriction,
-    Kind::ThermalDrift,
-    Kind::LoadDependentFriction,
-    Kind::JointCoupling,
-];
-
 /// Kinds that a first look may have taken for a drive that turns on its own; the rotor is part of it.
 const STANDS_IN: [Kind; 9] = [
     Kind::Armature,
@@ -442,11 +431,10 @@ impl Logs<'_> {
                 return Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt: None });
             }
             // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
-            let is = |kinds: &[Kind], entry: &Entry| kinds.contains(&entry.candidate.kind);
-            let loads = fit.set.iter().copied().filter(|&c| !is(&FRICTION, &exact.entries[c])).collect();
-            let loaded = data.loaded(&exact, &Fit { set: loads, ..fit.clone() })?;
+            let loaded = data.loaded(&exact, &fit)?;
             let data = Data { signals: &loaded, ..data };
-            let under_load = all.entries.iter().enumerate().filter(|(_, e)| is(&[Kind::LoadDependentFriction], e));
+            let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind == Kind::LoadDependentFriction;
+            let under_load = all.entries.iter().enumerate().filter(of_load);
             let changes: Vec<(usize, Candidate)> =
                 under_load.map(|(c, e)| (c, e.candidate.clone())).chain(changes).collect();
             all.replace(self.model, &loaded, &self.band, &self.still, &changes);

@@ -31,17 +31,6 @@ const KNOB: (f64, f64) = (0.2, 5.0);
 /// The same for a limit: far below where it is reached it would cut away what it is to explain.
 const LIMIT: (f64, f64) = (0.8, 1.5);
 
-/// Friction does not count as load where signatures are formed: where it rules, the load would have the sign of the speed, and
-/// friction under load be any friction. The law itself counts it.
-const FRICTION: [Kind; 6] = [
-    Kind::ViscousFriction,
-    Kind::CoulombFriction,
-    Kind::StribeckFriction,
-    Kind::PreslidingFriction,
-    Kind::ThermalDrift,
-    Kind::JointCoupling,
-];
-
 /// The logs that a problem is made from.
 #[derive(Clone, Copy)]
 pub struct Data<'a> {
@@ -117,18 +106,19 @@ impl Data<'_> {
             .collect()
     }
 
-    /// The signals, their gears loaded by the torque that the plant takes with what is no friction of a fit. It is predicted without
-    /// the measured effort, whose noise would explain itself; only play is crossed as that effort drives its rotor.
+    /// The signals, their gears loaded by the torque that the plant takes with what a fit has beside friction: where friction
+    /// rules, the load would have the sign of the speed, and friction under load be any friction. So would that friction itself
+    /// be load beside other friction of its joint. The law counts it all. The torque is predicted without the measured effort,
+    /// whose noise would explain itself; only play is crossed as that effort drives its rotor.
     ///
     /// # Errors
     /// An effect that the robot cannot have.
     pub fn loaded(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Signals>, EffectError> {
         let candidate = |c: usize| &problem.entries[c].candidate;
         let (rubs, others): (Vec<usize>, Vec<usize>) =
-            fit.set.iter().copied().partition(|&c| FRICTION.contains(&candidate(c).kind));
-        let rubs: Vec<usize> = rubs.into_iter().flat_map(|c| candidate(c).joints.clone()).collect();
-        // Nor does friction under load itself beside other friction of its joint.
-        let beside = |c: usize| candidate(c).joints.iter().any(|j| rubs.contains(j));
+            fit.set.iter().copied().partition(|&c| Kind::FRICTION.contains(&candidate(c).kind));
+        let beside =
+            |c: usize| rubs.iter().any(|&rub| candidate(rub).joints.iter().any(|j| candidate(c).joints.contains(j)));
         let counts = |&c: &usize| candidate(c).kind != Kind::LoadDependentFriction || !beside(c);
         let set = others.into_iter().filter(counts).collect();
         let effects = Fit { set, ..fit.clone() }.effects(problem, self.model);

@@ -15,13 +15,15 @@ const APART: f64 = 1.15;
 const POWERS: i32 = 5;
 
 /// The ripples that take most out of each joint's residual (`[episode][joint][signal]`) beside a smooth function of pose
-/// and speed and beside some candidates.
+/// and speed, beside a load on the flange, which can hide them in each joint that bears it, and beside some candidates.
 pub fn ripples(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>], beside: &[Candidate]) -> Vec<Candidate> {
+    let loads = Candidate::all(data.model).into_iter().filter(|c| c.kind == Kind::Payload);
+    let beside: Vec<Candidate> = loads.chain(beside.iter().cloned()).collect();
     per_joint(
         data,
         ranges,
         residuals,
-        beside,
+        &beside,
         |j| Candidate::ripples(j, &ranges[j]),
         |scored| {
             let mut kept: Vec<Candidate> = Vec::new();
@@ -122,4 +124,50 @@ fn per_joint(
             keep(scored.into_iter().map(|(_, candidate)| candidate).collect())
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::band::Band;
+    use crate::corrected::residual;
+    use crate::search::ranges;
+    use crate::signals::{Signals, standstill};
+    use gapscope_datasets::{Recipe, generate};
+    use gapscope_dynamics::robots;
+    use gapscope_effects::{Effect, Payload, Plant, TorqueRipple};
+
+    /// A ripple of 0.03 N m in a joint that bears most of a load of 3 kg.
+    #[test]
+    fn a_ripple_is_seen_beside_a_load_on_the_flange() {
+        let model = robots::model("arm6").unwrap().unwrap().model;
+        let on = |value: f64| [("joint5".to_owned(), value)].into();
+        let effects = [
+            Effect::Payload(Payload {
+                joint: "joint6".into(),
+                mass: 3.0,
+                com: [0.05, 0.05, 0.15],
+                inertia: [0.01, 0.0, 0.01, 0.0, 0.0, 0.01],
+            }),
+            Effect::TorqueRipple(TorqueRipple { amplitude: on(0.03), cycles: on(14.0), phase: on(0.7) }),
+        ];
+        let signals: Vec<Signals> = (1..4)
+            .map(|seed| generate(&model, &effects, seed, &Recipe::default(), "log").unwrap())
+            .map(|log| Signals::new(&model, &log).unwrap())
+            .collect();
+        let (band, still) = (Band::new(&signals), standstill(&signals, 6));
+        let data = Data {
+            model: &model,
+            signals: &signals,
+            band: &band,
+            standstill: &still,
+            moving: &[true; 6],
+            noise: &[1e-3; 6],
+        };
+        let nominal = |s: &Signals| residual(&mut Plant::nominal(&model, s.dt), &model, s, &still, 0.0);
+        let residuals: Vec<_> = signals.iter().map(nominal).collect();
+        let found = ripples(&data, &ranges(&model, &signals), &residuals, &[]);
+        let first = found.iter().find(|c| c.joints == [4]).unwrap();
+        assert!((first.shape - 14.0).abs() < 0.5, "{found:?}");
+    }
 }

@@ -122,7 +122,8 @@ impl Logs<'_> {
     /// alone have their turn, and where they predict as well with no more of them, so has the set without each of its kinds.
     /// Where more than noise is left, laws outside the catalogue compete, so that effects are chosen beside what they do not
     /// explain instead of bent to it; then drives are looked for, and beside a drive those laws once more. A set that makes
-    /// the gap larger is no explanation: then the next choice does without the kinds that promise most.
+    /// the gap larger, or that of one joint much larger, is no explanation: then the next choice does without the kinds that
+    /// promise most.
     pub(crate) fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
         let before = gap::total(&gap::squares(&self.band, &self.nominal_rows(), |_| true));
@@ -383,10 +384,7 @@ impl Logs<'_> {
         candidates.retain(|c| c.kind != Kind::TorqueSaturation || limits[c.joints[0]].contains(&c.shape));
         let open = Kind::OUTSIDE.iter().any(|kind| !forbidden.contains(kind));
         let outside = if open { Candidate::outside(self.model) } else { Vec::new() };
-        // A load on the flange can hide a ripple in each joint that bears it.
-        let loads = candidates.iter().filter(|c| c.kind == Kind::Payload);
-        let beside: Vec<Candidate> = loads.chain(&outside).cloned().collect();
-        candidates.extend(screen::ripples(&data, &ranges, &residuals, &beside));
+        candidates.extend(screen::ripples(&data, &ranges, &residuals, &outside));
         if open {
             candidates.extend(screen::places(&data, &ranges, &residuals, &outside));
         }
@@ -466,7 +464,7 @@ pub(crate) fn with_drive(problem: &Problem, set: &[usize], turned: &Option<Turne
 }
 
 /// What each joint does in the logs.
-fn ranges(model: &Model, signals: &[Signals]) -> Vec<Range> {
+pub(crate) fn ranges(model: &Model, signals: &[Signals]) -> Vec<Range> {
     let quantile =
         |sorted: &[f64], part: f64| sorted.get((part * sorted.len() as f64) as usize).copied().unwrap_or(0.0);
     (0..model.dof())

@@ -15,7 +15,6 @@ const LARGE: f64 = 0.1;
 const MATERIAL_GAP: f64 = 0.1;
 /// Effects explain the gap if they leave less than this part of its square above the floor: about a twentieth of the gap.
 const EXPLAINED: f64 = 0.003;
-
 /// A joint is spoilt where its gap is so many times what it was: beside something unknown, the right effects can make one a
 /// little larger.
 const SPOILT: f64 = 2.0;

@@ -104,6 +104,16 @@ impl Kind {
         Kind::JointCoupling,
     ];
 
+    /// Friction that hangs on motion and time alone, whatever the load.
+    pub const FRICTION: [Kind; 6] = [
+        Kind::ViscousFriction,
+        Kind::CoulombFriction,
+        Kind::StribeckFriction,
+        Kind::PreslidingFriction,
+        Kind::ThermalDrift,
+        Kind::JointCoupling,
+    ];
+
     /// Laws that the catalogue does not have: what its effects are held against. No [`crate::Effect`] is of such a kind.
     pub const OUTSIDE: [Kind; 5] = [Kind::LinkDrag, Kind::JointDrag, Kind::Swing, Kind::Rub, Kind::Catch];
 

@@ -1,7 +1,8 @@
 //! Laws outside the catalogue against mechanics: power of a drag, a stiff swing as a point mass, places that add up.
 
+use crate::support::motion;
 use gapscope_dynamics::{Data, Model, robots};
-use gapscope_effects::{Candidate, Column, Kind, Motion, Range};
+use gapscope_effects::{Candidate, Column, Kind, Range};
 use glam::DVec3;
 use nalgebra::DMatrix;
 
@@ -31,21 +32,8 @@ impl Run {
     }
 
     fn columns(&self, candidate: &Candidate) -> Vec<Column> {
-        let (model, q, v, a) = (&self.model, &self.q, &self.v, &self.a);
-        candidate.columns(&Motion {
-            model,
-            q,
-            v,
-            a,
-            tau: v,
-            nominal: v,
-            load: v,
-            held: None,
-            dt: DT,
-            start: 0.0,
-            pushed: &[],
-            standstill: &self.still,
-        })
+        let Run { model, q, v, a, still } = self;
+        candidate.columns(&motion(model, [q, v, a, v, v], DT, still))
     }
 
     /// Jacobian of a link's centre of mass, 3 × n, at a sample.

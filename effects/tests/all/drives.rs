@@ -5,7 +5,7 @@ use crate::support;
 use gapscope_dynamics::{Data, Model, StepModel, robots};
 use gapscope_effects::*;
 use std::collections::BTreeMap;
-use support::{DT, Run, hinge, one};
+use support::{DT, Run, hinge, motion, one};
 
 fn on(joint: &str, value: f64) -> BTreeMap<String, f64> {
     [(joint.to_owned(), value)].into()
@@ -234,20 +234,7 @@ fn left_of_a_log(effects: &[Effect], motor: bool) -> (f64, f64) {
         q.iter().map(|q| q.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]) / (DT * DT)).collect()).collect();
     let tau: Vec<Vec<f64>> = tau.iter().map(|x| x.windows(3).map(|w| 0.5 * (w[0] + w[1])).collect()).collect();
     let q: Vec<Vec<f64>> = q.iter().map(middle).collect();
-    let motion = Motion {
-        model: &model,
-        q: &q,
-        v: &v,
-        a: &a,
-        tau: &tau,
-        nominal: &q,
-        load: &q,
-        held: None,
-        dt: DT,
-        start: 0.0,
-        pushed: &[],
-        standstill: &[1e-6, 1e-6],
-    };
+    let motion = motion(&model, [&q, &v, &a, &tau, &q], DT, &[1e-6, 1e-6]);
     let rms = |mut plant: Plant| {
         let mut size: Vec<f64> = plant.residuals(&motion)[1].iter().map(|x| x * x).collect();
         size.sort_by(f64::total_cmp);

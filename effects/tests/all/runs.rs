@@ -1,10 +1,11 @@
 //! Signatures of effects with a knob or a memory against the plant, along whole runs.
 
-use crate::common;
+use crate::{common, support};
 
 use common::robot;
 use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{Candidate, Effect, EncoderSide, Kind, Motion, Plant, Range};
+use support::motion;
 
 const DT: f64 = 0.002;
 const SAMPLES: usize = 2000;
@@ -44,20 +45,7 @@ impl Run {
 
     fn motion<'a>(&'a self, model: &'a Model) -> Motion<'a> {
         let Run { q, v, a, tau, nominal, still } = self;
-        Motion {
-            model,
-            q,
-            v,
-            a,
-            tau,
-            nominal,
-            load: nominal,
-            held: None,
-            dt: DT,
-            start: 0.5,
-            pushed: &[[1.0, 2.0]],
-            standstill: still,
-        }
+        Motion { start: 0.5, pushed: &[[1.0, 2.0]], ..motion(model, [q, v, a, tau, nominal], DT, still) }
     }
 }
 

@@ -1,11 +1,12 @@
 //! Signatures against the plant: what an effect adds to the residual is the sum of its columns.
 
-use crate::common;
+use crate::{common, support};
 
 use common::{Draw, between, robot, rubbing};
 use gapscope_dynamics::{Data, JointKind, Model, robots};
 use gapscope_effects::{Candidate, Column, Effect, GravityMisalignment, Kind, Motion, Plant};
 use std::collections::BTreeSet;
+use support::motion;
 
 /// Samples of every motion.
 const SAMPLES: usize = 25;
@@ -53,21 +54,7 @@ impl Samples {
     }
 
     fn motion<'a>(&'a self, model: &'a Model) -> Motion<'a> {
-        let (q, v, a, tau, nominal) = (&self.q, &self.v, &self.a, &self.tau, &self.nominal);
-        Motion {
-            model,
-            q,
-            v,
-            a,
-            tau,
-            nominal,
-            load: nominal,
-            held: None,
-            dt: DT,
-            start: 0.0,
-            pushed: &[],
-            standstill: &self.still,
-        }
+        motion(model, [&self.q, &self.v, &self.a, &self.tau, &self.nominal], DT, &self.still)
     }
 
     /// Residual of a plant at every sample, joint-major.

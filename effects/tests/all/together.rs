@@ -112,18 +112,7 @@ fn friction_only_ever_takes_energy() {
     let model = robots::model("double_pendulum").unwrap().unwrap().model;
     // Free of friction the rule itself keeps energy to within this, as the first round shows.
     let own_error = 3e-3;
-    let mut rounds = vec![None];
-    rounds.extend(
-        [
-            Kind::ViscousFriction,
-            Kind::CoulombFriction,
-            Kind::StribeckFriction,
-            Kind::PreslidingFriction,
-            Kind::ThermalDrift,
-            Kind::JointCoupling,
-        ]
-        .map(Some),
-    );
+    let rounds = [None].into_iter().chain(Kind::FRICTION.map(Some));
     for kind in rounds {
         let effects: Vec<Effect> = all("joint1").into_iter().filter(|e| Some(e.kind()) == kind).collect();
         let mut run = Run::new(&model, &effects, DT);

@@ -51,8 +51,8 @@ const SOFTEST: f64 = 1.5;
 const STIFFEST: f64 = 20.0;
 /// A rotor lighter than this part of what it turns would not show.
 const LIGHTEST: f64 = 0.05;
-/// One block in so many must show something at all.
-const RARE: usize = 10;
+/// So many blocks of time must show something at all: a joint that its load holds on one side may cross its play once or twice.
+const LEAST_TELLING: usize = 2;
 const SEED: u64 = 5;
 
 /// An account of one joint's drive that leaves less than a rigid one.
@@ -150,7 +150,7 @@ impl<'a> Study<'a> {
         let rotor = self.rotor(&rigid);
         let (_, rigid_rotor) = self.turn(rigid.clone(), rotor);
         let without = self.left(&rigid, rigid_rotor);
-        if without.iter().filter(|left| **left > 2.0 * self.nothing).count() * RARE < without.len() {
+        if without.iter().filter(|left| **left > 2.0 * self.nothing).count() < LEAST_TELLING {
             return None;
         }
         let rigid_measure = self.measure(&rigid, rigid_rotor);

@@ -39,13 +39,14 @@ impl Coupling {
         Coupling { stiffness: inertia * omega * omega, damping: 2.0 * ratio * inertia * omega, half_gap: 0.0 }
     }
 
-    /// The angle that a torque is seen to hold, after an angle that was expected: play lies anywhere in its gap while hardly
-    /// any torque passes.
+    /// The angle that a torque is seen to hold, after an angle that was expected: play lies anywhere in its gap, and as far
+    /// beyond as hardly any torque winds it, while no more passes.
     fn held_by(&self, torque: f64, expected: f64) -> f64 {
+        let wound = torque / self.stiffness;
         if torque.abs() > TAKEN_UP * self.stiffness * self.half_gap {
-            torque / self.stiffness + self.half_gap * torque.signum()
+            wound + self.half_gap * torque.signum()
         } else {
-            expected.clamp(-self.half_gap, self.half_gap)
+            expected.clamp(wound.min(0.0) - self.half_gap, wound.max(0.0) + self.half_gap)
         }
     }
 

@@ -313,6 +313,7 @@ fn predicted(
         tau: &nominal,
         nominal: &nominal,
         load: &nominal,
+        effort_noise: &[],
         held: None,
         dt,
         start: 0.0,

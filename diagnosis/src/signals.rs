@@ -159,6 +159,7 @@ impl Signals {
             tau: &self.tau,
             nominal: &self.nominal,
             load: self.load.as_ref().unwrap_or(&self.nominal),
+            effort_noise: &self.effort_noise,
             held: Some(Held {
                 effort: &self.effort,
                 first: self.first - self.held.len() / 2,

@@ -4,7 +4,7 @@
 //! Source: Hamon, Gautier, Garrec, IEEE/RSJ IROS 2010 (dry friction that depends on load and velocity).
 
 use crate::effect::{Law, Value, check, per_joint};
-use crate::motion::soft_sign;
+use crate::motion::{mean_size, soft_sign};
 use crate::signature::Column;
 use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
@@ -45,12 +45,13 @@ impl Law for LoadDependentFriction {
 /// A gear that loses more than this locks itself.
 const SELF_LOCKING: f64 = 0.9;
 
-/// One column: the size of the torque that is predicted to load the gear, times the sign of the speed. Coefficient: μ, to
+/// One column: the mean size of the torque that is predicted to load the gear, times the sign of the speed. Coefficient: μ, to
 /// first order. Not the size of the measured effort: where friction is most of the effort, that would explain itself with
 /// μ = 1.
 pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     let standstill = motion.standstill[joint];
-    let load = |(v, tau): (&f64, &f64)| tau.abs() * soft_sign(*v, standstill);
+    let noise = motion.effort_noise.get(joint).copied().unwrap_or(0.0);
+    let load = |(v, tau): (&f64, &f64)| mean_size(*tau, noise).0 * soft_sign(*v, standstill);
     let column = Column::on(joint, motion.v[joint].iter().zip(&motion.load[joint]).map(load).collect(), 0.0);
     vec![Column { at_most: SELF_LOCKING, ..column }]
 }

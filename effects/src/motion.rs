@@ -1,6 +1,7 @@
 //! A motion with the effort that drove it: what signatures are evaluated on.
 
 use gapscope_dynamics::Model;
+use statrs::function::erf::erf;
 
 /// Joint signals of one continuous run on a uniform grid, joint-major: `q[j][k]` is joint j at sample k.
 ///
@@ -22,6 +23,8 @@ pub struct Motion<'a> {
     pub nominal: &'a [Vec<f64>],
     /// Torque that loads the gears, N m or N: the nominal one, or where it is known better what the plant takes with its effects.
     pub load: &'a [Vec<f64>],
+    /// Standard deviation of the noise of each joint's effort, sample by sample, N m or N; empty where it has none.
+    pub effort_noise: &'a [f64],
     /// What `tau` was made from; `None` where it is the effort itself.
     pub held: Option<Held<'a>>,
     /// Time from one sample to the next, s.
@@ -75,6 +78,21 @@ impl Motion<'_> {
         self.len() == 0
     }
 }
+
+/// Mean size of a torque with Gaussian noise of some standard deviation on it, and how fast it grows with that torque: a
+/// servo's answer to the noise of its encoder loads a gear, too. Folded normal distribution (Leone, Nelson, Nottingham,
+/// Technometrics 3(4) 1961).
+pub(crate) fn mean_size(torque: f64, noise: f64) -> (f64, f64) {
+    let z = torque / (std::f64::consts::SQRT_2 * noise);
+    if !z.is_finite() || z.abs() > CERTAIN {
+        return (torque.abs(), torque.signum());
+    }
+    let slope = erf(z);
+    ((2.0 / std::f64::consts::PI).sqrt() * noise * (-z * z).exp() + torque * slope, slope)
+}
+
+/// So many times √2 standard deviations from zero a torque's sign is certain.
+const CERTAIN: f64 = 5.0;
 
 /// Sign of a speed, linear inside the standstill band, where the true friction force is not known.
 pub fn soft_sign(speed: f64, standstill: f64) -> f64 {

@@ -3,7 +3,11 @@
 use super::{Direction, Plant};
 use crate::Motion;
 use crate::filter::{bristle, first_order, late};
+use crate::motion::mean_size;
 use crate::wind_up::{Coupling, JointRun, Oscillator, WindUp, inertia_about, slope_about};
+
+/// Steps of Newton's method towards an effort that friction under load grows with; it is a contraction.
+const LOAD_STEPS: usize = 4;
 
 /// What one sample needs to know beyond itself.
 #[derive(Default)]
@@ -12,6 +16,8 @@ struct Past<'a> {
     time: f64,
     /// Deflection of each bristle over its greatest one; `None` for bristles that slide.
     bristles: Option<&'a [f64]>,
+    /// Standard deviation of the noise of each joint's effort, N m (N); empty where it has none.
+    effort_noise: &'a [f64],
 }
 
 /// A drive along a run.
@@ -29,7 +35,7 @@ impl Plant {
     /// One sample knows nothing of the past: delay, lag and contact are left out, joints count as rigid, bristles as
     /// sliding and drives as warm; [`Plant::residuals`] knows them. Slices have length n. Allocates nothing.
     pub fn residual(&mut self, q: &[f64], v: &[f64], a: &[f64], tau: &[f64], standstill: &[f64], residual: &mut [f64]) {
-        self.rest(q, v, a, tau, standstill, &Past { time: f64::INFINITY, bristles: None }, residual);
+        self.rest(q, v, a, tau, standstill, &Past { time: f64::INFINITY, ..Past::default() }, residual);
         for (rest, gain) in residual.iter_mut().zip(&self.actuation.gain) {
             *rest /= gain;
         }
@@ -120,7 +126,7 @@ impl Plant {
                 a[drive.joint] -= drive.ahead.acceleration[k];
             }
             bent.iter_mut().zip(bristles).for_each(|(b, run)| *b = run[k]);
-            let past = Past { time: motion.start + k as f64 * motion.dt, bristles: Some(&bent) };
+            let past = Past { time: motion.start + k as f64 * motion.dt, bristles: Some(&bent), effort_noise: motion.effort_noise };
             self.rest(&q, &v, &a, &effort, motion.standstill, &past, &mut rest);
             for drive in turning {
                 // The rotor turns as the motor does, ahead of the link.
@@ -238,8 +244,15 @@ impl Plant {
         for direction in self.directions.iter().filter(|d| d.load > 0.0) {
             let (&[(j, _)], speed) = (direction.parts.as_slice(), direction.along(v)) else { continue };
             if speed.abs() >= standstill[j] && !held(j) {
-                let needed = s.delivered[j] - residual[j];
-                residual[j] = s.delivered[j] - needed / (1.0 - direction.load * speed.signum() * needed.signum());
+                let (needed, part) = (s.delivered[j] - residual[j], direction.load * speed.signum());
+                let mut effort = needed / (1.0 - part * needed.signum());
+                let noise = self.actuation.gain[j] * past.effort_noise.get(j).copied().unwrap_or(0.0);
+                // effort = needed + part · E|effort|; Newton's method, exact at once where the sign is certain.
+                for _ in 0..LOAD_STEPS {
+                    let (size, slope) = mean_size(effort, noise);
+                    effort -= (effort - needed - part * size) / (1.0 - part * slope);
+                }
+                residual[j] = s.delivered[j] - effort;
             }
         }
     }

@@ -29,7 +29,21 @@ pub fn hinge(inertia: f64) -> Model {
 /// Signals from the start of a log in which nothing pushes, gears loaded by the nominal torque; `[q, v, a, τ, nominal τ]`.
 pub fn motion<'a>(model: &'a Model, signals: [&'a [Vec<f64>]; 5], dt: f64, standstill: &'a [f64]) -> Motion<'a> {
     let [q, v, a, tau, nominal] = signals;
-    Motion { model, q, v, a, tau, nominal, load: nominal, held: None, dt, start: 0.0, pushed: &[], standstill }
+    Motion {
+        model,
+        q,
+        v,
+        a,
+        tau,
+        nominal,
+        load: nominal,
+        effort_noise: &[],
+        held: None,
+        dt,
+        start: 0.0,
+        pushed: &[],
+        standstill,
+    }
 }
 
 /// A value on the hinge.

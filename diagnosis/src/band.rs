@@ -18,7 +18,7 @@ const FOLDS: usize = 8;
 const FOLDS_AT_MOST: usize = 10;
 /// What a log does not show of its robot (on which side a play lies, how far a spring is wound) is unknown as it begins, and
 /// forgotten by the first row: after this time, s, or this part of a short log.
-const FORGOTTEN: f64 = 0.2;
+const FORGOTTEN: f64 = 0.15;
 const OF_A_SHORT_LOG: f64 = 0.05;
 /// Length of a bootstrap block, s: long against the correlation of what is left, short enough that there are many.
 const BLOCK: (f64, f64) = (0.5, 5.0);

@@ -158,6 +158,7 @@ mod tests {
             standstill: &still,
             moving: &[true; 2],
             noise: &[1e-3; 2],
+            rubbing: false,
         };
         let term = Term { candidate: Candidate::new(kind, vec![0]), tangent_at: None };
         let problem = data.problem(vec![term], &Kind::ALL);

@@ -3,7 +3,7 @@
 use crate::band::Band;
 use crate::contact;
 use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
-use crate::estimate::Fit;
+use crate::estimate::{Fit, speeds};
 use crate::evidence;
 use crate::experiment;
 use crate::floor::{self, noise_floor};
@@ -102,7 +102,7 @@ pub fn diagnose(
     }
     progress("signatures of every effect", 0.05);
     logs.look_for_pushes()?;
-    let chosen = logs.load_for_gain(logs.delay_or_lag(logs.choose(progress)?)?)?;
+    let chosen = logs.spared(logs.load_for_gain(logs.delay_or_lag(logs.choose(progress)?)?)?)?;
     progress("rivals", 0.55);
     let rivals = select::rivals(&chosen.all, &chosen.choice);
     logs.conclude(&chosen, &rivals, data, progress)
@@ -192,6 +192,7 @@ impl Logs<'_> {
             standstill: &self.still,
             moving: &self.moving,
             noise,
+            rubbing: false,
         }
     }
 
@@ -435,6 +436,7 @@ impl Logs<'_> {
     ) -> Result<Vec<FoundEffect>, EffectError> {
         let (problem, fit) = (&chosen.exact, &chosen.fit);
         let kinds = select::kinds(problem, &fit.set);
+        let speeds = speeds(&self.signals, &self.band, self.model.dof());
         let mut found = Vec::new();
         for (effect, own) in fit.effects_with_candidates(problem, self.model) {
             let kind = effect.kind();
@@ -471,7 +473,7 @@ impl Logs<'_> {
                     kind: kind.name().to_owned(),
                     joints: effect.law().joints(),
                     confidence: calibrated((1.0 - doubt) * (1.0 - misfit).powi(MISFIT)),
-                    parameters: fit.parameters(problem, self.model, kind, &own),
+                    parameters: fit.parameters(problem, self.model, kind, &own, &speeds),
                     indistinguishable_from: confused,
                     shrink: EffectShrink { torque: shrink },
                 },

@@ -1,21 +1,42 @@
 //! From coefficients to effects with parameters and intervals.
 
+use crate::band::Band;
 use crate::problem::Problem;
 use crate::schema::{Estimate, Parameter, Quantity};
 use crate::select::LATE;
+use crate::signals::Signals;
 use gapscope_dynamics::{JointKind, Model};
 use gapscope_effects::{Candidate, Effect, Kind, Value};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 
 /// What sampling, integration and the laws themselves leave of any parameter, as a part of it; no number of rows averages
 /// that out.
 const SYSTEMATIC: f64 = 3e-3;
+/// The same of friction: near rest, where simulators soften it and robots creep, no law is the law.
+const OF_FRICTION: f64 = 1e-2;
 /// When an effort acts within its sample, loggers and simulators do not say to better than this part of a sample.
 const TIMING: f64 = 0.2;
 /// Step of the numerical derivative from coefficients to parameters, in standard errors.
 const STEP: f64 = 1e-3;
+
+/// Parts of a joint's speed, as many rows in each, over which a law must hold.
+const PARTS: usize = 12;
+
+/// The part of its speed in which each joint is at each row of a band: `[joint][row]`.
+pub fn speeds(signals: &[Signals], band: &Band, joints: usize) -> Vec<Vec<usize>> {
+    (0..joints)
+        .map(|j| {
+            let speed: Vec<f64> = band.rows.iter().map(|row| signals[row.episode].v[j][row.center].abs()).collect();
+            let mut order: Vec<usize> = (0..speed.len()).collect();
+            order.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
+            let mut part = vec![0; speed.len()];
+            order.iter().enumerate().for_each(|(rank, &row)| part[row] = rank * PARTS / speed.len());
+            part
+        })
+        .collect()
+}
 
 /// A model in coefficients: a set of candidates fitted to some rows.
 #[derive(Debug, Clone)]
@@ -87,27 +108,41 @@ impl Fit {
         effects
     }
 
-    /// Parameters of an effect of a kind made of some candidates under their public names, with 95 % intervals by the delta method.
+    /// Parameters of an effect of a kind made of some candidates under their public names, with 95 % intervals by the delta
+    /// method: the wider of what blocks of time and of what parts of the speed of each of its joints tell, `speeds` telling the
+    /// part of each row of the band for each joint.
     pub fn parameters(
         &self,
         problem: &Problem,
         model: &Model,
         kind: Kind,
         candidates: &[usize],
+        speeds: &[Vec<usize>],
     ) -> BTreeMap<String, Parameter> {
-        let covariance = problem.covariance(&self.columns, &self.theta);
-        let quantile = StudentsT::new(0.0, 1.0, problem.blocks_used().saturating_sub(1).max(1) as f64)
-            .map_or(1.96, |t| t.inverse_cdf(0.975));
+        let quantile = |groups: usize| {
+            StudentsT::new(0.0, 1.0, groups.saturating_sub(1).max(1) as f64).map_or(1.96, |t| t.inverse_cdf(0.975))
+        };
+        let over_time = problem.covariance(&self.columns, &self.theta) * quantile(problem.blocks_used()).powi(2);
+        let mut over_speed: BTreeMap<usize, DMatrix<f64>> = BTreeMap::new();
         let mut parameters: BTreeMap<String, Parameter> = BTreeMap::new();
         for &c in candidates {
             let (at, theta) = self.own(problem, c);
-            let own = DMatrix::from_fn(at.len(), at.len(), |i, k| covariance[(at[i], at[k])]);
+            let candidate = &problem.entries[c].candidate;
+            for &j in &candidate.joints {
+                over_speed.entry(j).or_insert_with(|| {
+                    problem.covariance_over(&self.columns, &self.theta, &speeds[j]) * quantile(PARTS).powi(2)
+                });
+            }
+            // Squares of half-widths.
+            let accounts: Vec<DMatrix<f64>> = std::iter::once(&over_time)
+                .chain(candidate.joints.iter().filter_map(|j| over_speed.get(j)))
+                .map(|all| DMatrix::from_fn(at.len(), at.len(), |i, k| all[(at[i], at[k])]))
+                .collect();
             let values = |theta: &[f64]| -> Option<Vec<Value>> {
                 let effects = problem.entries[c].effects(model, theta, self.without);
                 Some(effects.iter().find(|e| e.kind() == kind)?.law().parameters())
             };
             let Some(estimates) = values(&theta) else { continue };
-            let candidate = &problem.entries[c].candidate;
             // What a knob known by other means may be off by.
             let knob_moved: Option<Vec<Value>> = (candidate.knob_error > 0.0).then_some(candidate).and_then(|known| {
                 let moved = Candidate { shape: known.shape + known.knob_error, ..known.clone() }.effects(model, &theta);
@@ -115,7 +150,7 @@ impl Fit {
             });
             let slopes: Vec<Option<(f64, Vec<Value>)>> = (0..theta.len())
                 .map(|i| {
-                    let step = STEP * own[(i, i)].sqrt();
+                    let step = STEP * accounts[0][(i, i)].sqrt();
                     let mut moved = theta.clone();
                     moved[i] += step;
                     (step.is_finite() && step > 0.0).then_some(())?;
@@ -123,6 +158,7 @@ impl Fit {
                 })
                 .collect();
             for (v, estimate) in estimates.iter().enumerate() {
+                let systematic = if Kind::FRICTION.contains(&kind) { OF_FRICTION } else { SYSTEMATIC };
                 let size = estimate.value.iter().map(|x| x * x).sum::<f64>().sqrt();
                 let half: Vec<f64> = (0..estimate.value.len())
                     .map(|component| {
@@ -134,16 +170,14 @@ impl Fit {
                                 })
                             })
                             .collect();
-                        let variance: f64 = (0..at.len())
-                            .flat_map(|i| (0..at.len()).map(move |k| (i, k)))
-                            .map(|(i, k)| gradient[i] * own[(i, k)] * gradient[k])
-                            .sum();
+                        let gradient = DVector::from_vec(gradient);
+                        let square = accounts.iter().map(|own| gradient.dot(&(own * &gradient))).fold(0.0, f64::max);
                         let knob = knob_moved
                             .as_ref()
                             .map_or(0.0, |moved| moved[v].value[component] - estimate.value[component]);
-                        let variance = variance.max(0.0) + knob * knob;
                         let timing = if LATE.contains(&kind) { TIMING * problem.sample } else { 0.0 };
-                        (quantile * variance.sqrt()).hypot(SYSTEMATIC * size).hypot(timing)
+                        let knob = knob * quantile(problem.blocks_used());
+                        square.sqrt().hypot(knob).hypot(systematic * size).hypot(timing)
                     })
                     .collect();
                 let at_rest = problem.entries[c].held(self.without);

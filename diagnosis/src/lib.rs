@@ -35,6 +35,7 @@ pub mod schema;
 mod screen;
 mod search;
 mod select;
+mod spare;
 mod signals;
 mod verdict;
 

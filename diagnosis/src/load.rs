@@ -3,6 +3,7 @@
 //! two are not told apart. The law itself tells.
 
 use crate::diagnose::Logs;
+use crate::refine::Data;
 use crate::search::{Chosen, with_drive};
 use crate::select;
 use gapscope_effects::{EffectError, Kind};
@@ -25,7 +26,8 @@ impl Logs<'_> {
         };
         set.sort_unstable();
         set.dedup();
-        let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
+        let data = Data { rubbing: true, ..self.data(&chosen.noise) };
+        let (exact, fit) = data.refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
         if self.left(&exact, &fit.set)? > self.left(&chosen.exact, &chosen.fit.set)? {
             return Ok(chosen);
         }

@@ -46,6 +46,9 @@ pub struct Data<'a> {
     pub moving: &'a [bool],
     /// Noise floor of each joint.
     pub noise: &'a [f64],
+    /// Whether friction loads the gears as well: exact, but while it is not known which friction of a joint there is, friction
+    /// under load could then be any of it.
+    pub rubbing: bool,
 }
 
 impl Data<'_> {
@@ -120,7 +123,7 @@ impl Data<'_> {
         let beside =
             |c: usize| rubs.iter().any(|&rub| candidate(rub).joints.iter().any(|j| candidate(c).joints.contains(j)));
         let counts = |&c: &usize| candidate(c).kind != Kind::LoadDependentFriction || !beside(c);
-        let set = others.into_iter().filter(counts).collect();
+        let set = if self.rubbing { fit.set.clone() } else { others.into_iter().filter(counts).collect() };
         let effects = Fit { set, ..fit.clone() }.effects(problem, self.model);
         let side = problem.side(&fit.set);
         let crossed = effects.iter().any(|effect| effect.kind() == Kind::Backlash);

@@ -72,17 +72,41 @@ impl Problem {
 
     /// Covariance of the coefficients by the sandwich over blocks, which allows for any correlation inside a block.
     pub fn covariance(&self, columns: &[usize], theta: &[f64]) -> DMatrix<f64> {
-        let m = columns.len();
-        let mut meat = DMatrix::zeros(m, m);
-        let mut used = 0;
-        for block in self.blocks.iter().filter(|b| b.square > 0.0) {
-            let score = DVector::from_fn(m, |i, _| {
+        let of_block = |block: &Normal| {
+            DVector::from_fn(columns.len(), |i, _| {
                 let g: f64 = columns.iter().zip(theta).map(|(&c, t)| block.gram[(columns[i], c)] * t).sum();
                 block.moment[columns[i]] - g
-            });
-            meat += &score * score.transpose();
-            used += 1;
+            })
+        };
+        let scores: Vec<DVector<f64>> = self.blocks.iter().filter(|b| b.square > 0.0).map(of_block).collect();
+        self.sandwich(columns, &scores)
+    }
+
+    /// The same by the sandwich over parts of the rows, `part` telling the part of each row of the band: a law that is not
+    /// the robot's pulls one way in one part and the other way in another, in every block of time alike.
+    pub fn covariance_over(&self, columns: &[usize], theta: &[f64], part: &[usize]) -> DMatrix<f64> {
+        let mut scores = vec![DVector::zeros(columns.len()); part.iter().max().map_or(0, |last| last + 1)];
+        for (j, joint) in self.joints.iter().enumerate() {
+            let at: Vec<(usize, usize)> = columns
+                .iter()
+                .enumerate()
+                .filter_map(|(i, c)| joint.columns.binary_search(c).ok().map(|at| (i, at)))
+                .collect();
+            let scale = self.row_scale(j);
+            for (r, rest) in joint.residual(columns, theta).into_iter().enumerate() {
+                let score = &mut scores[part[joint.rows[r]]];
+                for &(i, at) in &at {
+                    score[i] += joint.robust[r] * scale * joint.values[r * joint.columns.len() + at] * rest;
+                }
+            }
         }
+        self.sandwich(columns, &scores)
+    }
+
+    /// Bread and meat of some scores, each of a group of rows that may depend on each other as they like.
+    fn sandwich(&self, columns: &[usize], scores: &[DVector<f64>]) -> DMatrix<f64> {
+        let (m, used) = (columns.len(), scores.len());
+        let meat = scores.iter().fold(DMatrix::zeros(m, m), |meat, score| meat + score * score.transpose());
         let bread = self.regular(columns, &self.total).cholesky().map(|c| c.inverse());
         let Some(bread) = bread else { return DMatrix::from_element(m, m, f64::INFINITY) };
         let factor = if used > 1 { used as f64 / (used - 1) as f64 } else { f64::INFINITY };

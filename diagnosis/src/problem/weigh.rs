@@ -95,13 +95,12 @@ impl Problem {
     pub(super) fn accumulate(&mut self, band: &Band) {
         let p = self.bounds.len();
         let joints = &self.joints;
-        let (sigma, correlation) = (&self.sigma, &self.correlation);
         let blocks: Vec<Normal> = (0..band.blocks)
             .into_par_iter()
             .map(|block| {
                 let mut normal = Normal::zeros(p);
                 for (j, rows) in joints.iter().enumerate() {
-                    let scale = 1.0 / (sigma[j] * sigma[j] * correlation[j]);
+                    let scale = self.row_scale(j);
                     let m = rows.columns.len();
                     let mine: Vec<usize> =
                         (0..rows.rows.len()).filter(|&i| band.rows[rows.rows[i]].block == block).collect();
@@ -140,6 +139,11 @@ impl Problem {
         }
         self.total = before;
         self.blocks = blocks;
+    }
+
+    /// What a row of a joint counts, its robust weight aside.
+    pub(super) fn row_scale(&self, joint: usize) -> f64 {
+        1.0 / (self.sigma[joint] * self.sigma[joint] * self.correlation[joint])
     }
 
     /// Rows that count as independent, all joints together; two at least.

@@ -183,7 +183,7 @@ impl Fit {
                 let at_rest = problem.entries[c].held(self.without);
                 let half = match (estimate.name, at_rest) {
                     ("static", Some(held)) if estimate.value == [held.torque] => {
-                        vec![held.doubt.hypot(SYSTEMATIC * size)]
+                        vec![held.doubt.hypot(systematic * size)]
                     }
                     _ => half,
                 };

@@ -8,10 +8,10 @@ use gapscope_effects::{EffectError, Kind};
 
 /// Part of a joint's gap to which it must be explained for what is left of it to be what its laws are not exact to.
 const NEARLY: f64 = 0.1;
-/// There, and over this multiple of the noise, a kind must take away so much of what would be left without it: less than what
-/// no effect explains is no effect.
+/// There, and over this multiple of the noise, ...
 const OVER_NOISE: f64 = 1.5;
-const NEEDED: f64 = 1.1;
+/// ... a kind must move the joint by as much as is left of it: what is smaller than what no effect explains cannot be named.
+const NEEDED: f64 = std::f64::consts::SQRT_2;
 
 impl Logs<'_> {
     /// The choice without the kinds whose absence leaves no more of held-out data, or hardly more of joints that are explained.

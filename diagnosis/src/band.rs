@@ -16,10 +16,6 @@ const LEAST_WEIGHT: f64 = 0.6;
 const FOLDS: usize = 8;
 /// At most this many folds; episodes beyond share them.
 const FOLDS_AT_MOST: usize = 10;
-/// What a log does not show of its robot (on which side a play lies, how far a spring is wound) is unknown as it begins, and
-/// forgotten by the first row: after this time, s, or this part of a short log.
-const FORGOTTEN: f64 = 0.15;
-const OF_A_SHORT_LOG: f64 = 0.05;
 /// Length of a bootstrap block, s: long against the correlation of what is left, short enough that there are many.
 const BLOCK: (f64, f64) = (0.5, 5.0);
 /// Number of blocks aimed at.
@@ -82,8 +78,7 @@ impl Band {
             let step = ((1.0 / (ROWS_PER_PERIOD * cutoff * s.dt)).round() as usize).max(1);
             let part_length = s.len().div_ceil(parts);
             let per_part = ((part_length as f64 * s.dt / block_length).round() as usize).max(1);
-            let settled = (FORGOTTEN / s.dt).min(OF_A_SHORT_LOG * s.len() as f64) as usize;
-            let mut center = kernel.reach + settled;
+            let mut center = kernel.reach;
             while center + kernel.reach < s.len() {
                 let part = center / part_length;
                 let inside = center - part * part_length;

@@ -14,7 +14,7 @@ const RESTS: f64 = 0.1;
 /// Part of the rests of a fold that end well below the break-away torque: by so many times what the others differ, it may
 /// lie higher, as a rest that ends in a moment is averaged with what comes before.
 const WELL_BELOW: f64 = 0.98;
-const SPREADS: f64 = 4.0;
+const SPREADS: f64 = 3.0;
 
 /// What friction held at rest in the rows of a fold, N m or N.
 #[derive(Debug, Clone, Copy)]

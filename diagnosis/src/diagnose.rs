@@ -102,7 +102,7 @@ pub fn diagnose(
     }
     progress("signatures of every effect", 0.05);
     logs.look_for_pushes()?;
-    let chosen = logs.spared(logs.load_for_gain(logs.delay_or_lag(logs.choose(progress)?)?)?)?;
+    let chosen = logs.load_for_gain(logs.delay_or_lag(logs.choose(progress)?)?)?;
     progress("rivals", 0.55);
     let rivals = select::rivals(&chosen.all, &chosen.choice);
     logs.conclude(&chosen, &rivals, data, progress)

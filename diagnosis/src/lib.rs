@@ -35,7 +35,6 @@ pub mod schema;
 mod screen;
 mod search;
 mod select;
-mod spare;
 mod signals;
 mod verdict;
 

@@ -18,6 +18,14 @@ const TAKEN_UP: f64 = 0.01;
 /// Samples, at least, from which a spring's first angle and its rate are told, by what it does in its first period.
 const LEAST_SEEN: usize = 8;
 
+/// Time in which play is crossed and its side known, s, places in the gap from which that is tried, and the longest time for
+/// which it was let go before the first sample, s.
+const CROSSED: f64 = 0.1;
+const PLACES: usize = 8;
+const LET_GO_FOR: f64 = 0.02;
+/// Part of the squared torque at first to which play at rest must account for it for no other start to be tried.
+const SETTLED: f64 = 0.01;
+
 /// A coupling that is so soft, under a link that falls, that it runs away begins anew from here, rad (m).
 const LET_GO: f64 = 100.0;
 
@@ -99,7 +107,7 @@ pub(crate) struct Oscillator<'a> {
 }
 
 impl Oscillator<'_> {
-    /// The wind-up from rest under the first sample's drive, or from the state that a spring is `seen` to begin in.
+    /// The wind-up from rest under the first sample's drive, or from the state that it is `seen` to begin in.
     ///
     /// Left to itself the oscillation rings with the noise of the drive, and play chatters as no simulation follows.
     /// `seen` is the torque through the joint by the account of the other side of it: the angle is drawn to the one that it
@@ -108,15 +116,37 @@ impl Oscillator<'_> {
     pub fn wind_up(&self, seen: Option<&[f64]>) -> WindUp {
         let first = self.drive.first().copied().unwrap_or(0.0);
         let at_rest = (first / self.coupling.stiffness + self.coupling.half_gap * first.signum(), 0.0);
-        self.from(seen.and_then(|seen| self.start(seen)).unwrap_or(at_rest), seen)
+        self.from(seen.and_then(|seen| self.start(seen, at_rest)).unwrap_or(at_rest), seen)
     }
 
-    /// First angle and rate of a spring, of the runs from any that come nearest to the torque `seen` in the first period
-    /// (least squares); nothing for play, and for what is too short to tell.
-    fn start(&self, seen: &[f64]) -> Option<(f64, f64)> {
-        if self.coupling.half_gap > 0.0 {
-            return None;
+    /// First angle and rate of the run that comes nearest to the torque `seen` at first (least squares); nothing for what is
+    /// too short to tell.
+    fn start(&self, seen: &[f64], at_rest: (f64, f64)) -> Option<(f64, f64)> {
+        if self.coupling.half_gap > 0.0 { self.start_of_play(seen, at_rest) } else { self.start_of_spring(seen) }
+    }
+
+    /// Of play, where it is not at rest under its load: somewhere in the gap, at a rate that it took up as it was let go.
+    fn start_of_play(&self, seen: &[f64], at_rest: (f64, f64)) -> Option<(f64, f64)> {
+        let samples = ((CROSSED / self.dt) as usize).clamp(LEAST_SEEN, self.drive.len().max(LEAST_SEEN));
+        let (drive, inertia) = (self.drive.get(..samples)?, self.inertia.get(..samples)?);
+        let first = Oscillator { drive, inertia, slope: self.slope.and_then(|slope| slope.get(..samples)), ..*self };
+        let seen = seen.get(..samples)?;
+        let off = |start: (f64, f64)| -> f64 {
+            first.torque_from(start).iter().zip(seen).map(|(torque, seen)| (torque - seen).powi(2)).sum()
+        };
+        let least = off(at_rest);
+        if least <= SETTLED * dot(seen, seen) {
+            return Some(at_rest);
         }
+        let let_go = LET_GO_FOR * drive.first()? / inertia.first()?;
+        let angles = (0..=PLACES).map(|i| (2.0 * i as f64 / PLACES as f64 - 1.0) * self.coupling.half_gap);
+        let starts = angles.flat_map(|angle| [0.0, 0.5, 1.0].map(|part| (angle, part * let_go)));
+        let all = starts.map(|start| (off(start), start)).chain([(least, at_rest)]);
+        all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start)
+    }
+
+    /// Of a spring: of the runs from any state, that in the first period.
+    fn start_of_spring(&self, seen: &[f64]) -> Option<(f64, f64)> {
         let period = TAU * (self.inertia.first()? / self.coupling.stiffness).sqrt();
         let samples = ((period / self.dt) as usize).clamp(LEAST_SEEN, self.drive.len().max(LEAST_SEEN));
         let driven = Oscillator {

@@ -98,3 +98,26 @@ const CERTAIN: f64 = 5.0;
 pub fn soft_sign(speed: f64, standstill: f64) -> f64 {
     if speed.abs() >= standstill { speed.signum() } else { speed / standstill }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::mean_size;
+
+    #[test]
+    fn the_mean_size_is_that_of_a_torque_with_gaussian_noise() {
+        for torque in [-2.0f64, -0.3, 0.0, 0.05, 1.1, 40.0] {
+            let noise = 0.7;
+            let density = |z: f64| (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+            let mean: f64 = (-8000..=8000)
+                .map(|i| f64::from(i) * 1e-3)
+                .map(|z| (torque + noise * z).abs() * density(z) * 1e-3)
+                .sum();
+            let (size, slope) = mean_size(torque, noise);
+            assert!((size - mean).abs() < 1e-6, "{torque}: {size} for {mean}");
+            let step = 1e-5;
+            let difference = (mean_size(torque + step, noise).0 - mean_size(torque - step, noise).0) / (2.0 * step);
+            assert!((slope - difference).abs() < 1e-6, "{torque}: {slope} for {difference}");
+            assert_eq!(mean_size(torque, 0.0), (torque.abs(), torque.signum()));
+        }
+    }
+}

@@ -350,6 +350,23 @@ mod tests {
     }
 
     #[test]
+    fn a_play_that_begins_let_go_in_its_gap_is_followed_through_its_first_blow() {
+        let coupling = Coupling { half_gap: 0.01, ..Coupling::resonant(0.2, 20.0, 0.1) };
+        let (drive, inertia) = (vec![3.0; 200], vec![0.2; 200]);
+        let motor = Oscillator { drive: &drive, inertia: &inertia, slope: None, coupling, dt: 2e-3 };
+        let truth = motor.torque_from((-0.0067, 0.12));
+        let off = |start: (f64, f64)| -> f64 {
+            motor.torque_from(start).iter().zip(&truth).map(|(torque, truth)| (torque - truth).powi(2)).sum()
+        };
+        let at_rest = (0.01 + 3.0 / coupling.stiffness, 0.0);
+        let start = motor.start(&truth, at_rest).unwrap();
+        assert!(off(start) < 0.2 * off(at_rest), "{start:?}: {} of {}", off(start), off(at_rest));
+        // One that rests under its load stays as it is.
+        let resting = motor.torque_from(at_rest);
+        assert_eq!(motor.start(&resting, at_rest), Some(at_rest));
+    }
+
+    #[test]
     fn a_link_that_falls_faster_than_its_spring_holds_stays_finite() {
         let coupling = Coupling { stiffness: 10.0, damping: 0.0, half_gap: 0.0 };
         let (drive, inertia, slope) = (vec![1.0; 5000], vec![0.1; 5000], vec![-1000.0; 5000]);

@@ -126,7 +126,11 @@ impl Plant {
                 a[drive.joint] -= drive.ahead.acceleration[k];
             }
             bent.iter_mut().zip(bristles).for_each(|(b, run)| *b = run[k]);
-            let past = Past { time: motion.start + k as f64 * motion.dt, bristles: Some(&bent), effort_noise: motion.effort_noise };
+            let past = Past {
+                time: motion.start + k as f64 * motion.dt,
+                bristles: Some(&bent),
+                effort_noise: motion.effort_noise,
+            };
             self.rest(&q, &v, &a, &effort, motion.standstill, &past, &mut rest);
             for drive in turning {
                 // The rotor turns as the motor does, ahead of the link.

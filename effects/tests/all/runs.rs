@@ -4,7 +4,7 @@ use crate::{common, support};
 
 use common::robot;
 use gapscope_dynamics::{Data, Model};
-use gapscope_effects::{Candidate, Effect, EncoderSide, Kind, Motion, Plant, Range};
+use gapscope_effects::{Candidate, Effect, EncoderSide, Kind, LoadDependentFriction, Motion, Plant, Range};
 use support::motion;
 
 const DT: f64 = 0.002;
@@ -173,4 +173,28 @@ fn one_joint_alone_is_the_plant_to_first_order() {
             assert!(kind == Kind::Armature || adds > 5e-3, "{kind:?} {side:?} adds {adds:e}");
         }
     }
+}
+
+/// A servo's answer to its encoder's noise loads the gear as well: on average the drive delivers more than the smooth effort
+/// loses, and a plant that knows the noise leaves nothing.
+#[test]
+fn friction_under_the_load_of_a_noisy_effort_goes_by_its_mean_size() {
+    let model = support::hinge(0.2);
+    let (coefficient, effort, noise, samples) = (0.2, 0.5, 1.0, 50);
+    let density = |z: f64| (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    let mean_size: f64 =
+        (-800..=800).map(|i| f64::from(i) * 1e-2).map(|z| (effort + noise * z).abs() * density(z) * 1e-2).sum();
+    let needed = effort - coefficient * mean_size;
+    let of = |x: f64| vec![vec![x; samples]];
+    let (q, v, a, tau, nominal) = (of(0.0), of(1.0), of(needed / 0.2), of(effort), of(needed));
+    let still = [STILL];
+    let friction =
+        LoadDependentFriction { load_coefficient: std::iter::once(("joint1".to_owned(), coefficient)).collect() };
+    let left = |noise: &[f64]| {
+        let motion = Motion { effort_noise: noise, ..motion(&model, [&q, &v, &a, &tau, &nominal], DT, &still) };
+        let mut plant = Plant::new(&model, &[Effect::LoadDependentFriction(friction.clone())], DT).unwrap();
+        plant.residuals(&motion)[0][samples / 2]
+    };
+    assert!(left(&[noise]).abs() < 1e-4, "{}", left(&[noise]));
+    assert!(left(&[]).abs() > 0.05, "{}", left(&[]));
 }

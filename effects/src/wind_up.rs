@@ -25,6 +25,8 @@ const PLACES: usize = 8;
 const LET_GO_FOR: f64 = 0.02;
 /// Part of the squared torque at first to which play at rest must account for it for no other start to be tried.
 const SETTLED: f64 = 0.01;
+/// What another start must leave of what play at rest does: a gap that is not quite right is no other start.
+const BEYOND_DOUBT: f64 = 0.25;
 
 /// A coupling that is so soft, under a link that falls, that it runs away begins anew from here, rad (m).
 const LET_GO: f64 = 100.0;
@@ -47,14 +49,13 @@ impl Coupling {
         Coupling { stiffness: inertia * omega * omega, damping: 2.0 * ratio * inertia * omega, half_gap: 0.0 }
     }
 
-    /// The angle that a torque is seen to hold, after an angle that was expected: play lies anywhere in its gap, and as far
-    /// beyond as hardly any torque winds it, while no more passes.
+    /// The angle that a torque is seen to hold, after an angle that was expected: play lies anywhere in its gap while hardly
+    /// any torque passes.
     fn held_by(&self, torque: f64, expected: f64) -> f64 {
-        let wound = torque / self.stiffness;
         if torque.abs() > TAKEN_UP * self.stiffness * self.half_gap {
-            wound + self.half_gap * torque.signum()
+            torque / self.stiffness + self.half_gap * torque.signum()
         } else {
-            expected.clamp(wound.min(0.0) - self.half_gap, wound.max(0.0) + self.half_gap)
+            expected.clamp(-self.half_gap, self.half_gap)
         }
     }
 
@@ -141,8 +142,8 @@ impl Oscillator<'_> {
         let let_go = LET_GO_FOR * drive.first()? / inertia.first()?;
         let angles = (0..=PLACES).map(|i| (2.0 * i as f64 / PLACES as f64 - 1.0) * self.coupling.half_gap);
         let starts = angles.flat_map(|angle| [0.0, 0.5, 1.0].map(|part| (angle, part * let_go)));
-        let all = starts.map(|start| (off(start), start)).chain([(least, at_rest)]);
-        all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start)
+        let best = starts.map(|start| (off(start), start)).min_by(|a, b| a.0.total_cmp(&b.0));
+        best.map(|(off, start)| if off < BEYOND_DOUBT * least { start } else { at_rest })
     }
 
     /// Of a spring: of the runs from any state, that in the first period.

@@ -131,7 +131,7 @@ fn beyond_noise(entry: usize, parts: &[(Problem, Fit); 2]) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::problem::Term;
     use crate::refine::Data;
@@ -139,8 +139,8 @@ mod tests {
     use gapscope_datasets::{Recipe, generate};
     use gapscope_dynamics::robots;
 
-    /// What falls apart of a kind fitted to the first joint of a double pendulum, of logs to which something is done.
-    fn fitted_as(kind: Kind, done: impl Fn(&mut Signals)) -> Vec<(usize, f64)> {
+    /// A kind fitted to the first joint of a double pendulum, of logs to which something is done.
+    pub(crate) fn fitted(kind: Kind, done: impl Fn(&mut Signals)) -> (Vec<Signals>, Band, Problem, Fit) {
         let model = robots::model("double_pendulum").unwrap().unwrap().model;
         let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
         let signals: Vec<Signals> = (1..4)
@@ -162,11 +162,18 @@ mod tests {
         };
         let term = Term { candidate: Candidate::new(kind, vec![0]), tangent_at: None };
         let problem = data.problem(vec![term], &Kind::ALL);
-        inconsistent(&problem, &Fit::on_all(&problem, &[0]), &signals, &band)
+        let fit = Fit::on_all(&problem, &[0]);
+        (signals, band, problem, fit)
+    }
+
+    /// What falls apart of it.
+    fn fitted_as(kind: Kind, done: impl Fn(&mut Signals)) -> Vec<(usize, f64)> {
+        let (signals, band, problem, fit) = fitted(kind, done);
+        inconsistent(&problem, &fit, &signals, &band)
     }
 
     /// Torque on the first joint, from its velocity.
-    fn torque(law: fn(f64) -> f64) -> impl Fn(&mut Signals) {
+    pub(crate) fn torque(law: fn(f64) -> f64) -> impl Fn(&mut Signals) {
         move |s| s.tau[0].iter_mut().zip(&s.v[0]).for_each(|(tau, v)| *tau += law(*v))
     }
 

@@ -222,3 +222,32 @@ fn insert(parameters: &mut BTreeMap<String, Parameter>, model: &Model, value: &V
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::constancy::tests::{fitted, torque};
+
+    /// A drag that grows with the square of the speed, fitted as one that grows with it, is too weak at any high speed and too
+    /// strong at any low one: in every block of time the two are nearly even, and only parts of the speed tell.
+    #[test]
+    fn a_law_that_is_not_the_robots_is_less_certain_by_parts_of_the_speed() {
+        let (signals, band, problem, fit) = fitted(Kind::ViscousFriction, torque(|v| 0.5 * v * v.abs()));
+        let (at, _) = fit.own(&problem, 0);
+        let over_time = problem.covariance(&fit.columns, &fit.theta)[(at[0], at[0])];
+        let part = &speeds(&signals, &band, 2)[0];
+        let over_speed = problem.covariance_over(&fit.columns, &fit.theta, part)[(at[0], at[0])];
+        assert!(over_speed > 2.0 * over_time, "{over_speed} and {over_time}");
+        // As many rows in each part.
+        let rows = |of: usize| part.iter().filter(|p| **p == of).count();
+        assert!((0..PARTS).all(|of| rows(of).abs_diff(part.len() / PARTS) <= 1));
+        let model = gapscope_dynamics::robots::model("double_pendulum").unwrap().unwrap().model;
+        let told = fit.parameters(&problem, &model, Kind::ViscousFriction, &[0], &speeds(&signals, &band, 2));
+        let Parameter::PerJoint(joints) = &told["viscous"] else { panic!("one a joint") };
+        let Some(Estimate { ci95: [Quantity::Scalar(low), Quantity::Scalar(high)], .. }) = joints.values().next()
+        else {
+            panic!("one number")
+        };
+        assert!(0.5 * (high - low) > 1.96 * over_speed.sqrt(), "{low} to {high}");
+    }
+}

@@ -109,9 +109,9 @@ impl Data<'_> {
             .collect()
     }
 
-    /// The signals, their gears loaded by the torque that the plant takes with what a fit has beside friction: where friction
-    /// rules, the load would have the sign of the speed, and friction under load be any friction. So would that friction itself
-    /// be load beside other friction of its joint. The law counts it all. The torque is predicted without the measured effort,
+    /// The signals, their gears loaded by the torque that the plant takes with what a fit has beside friction, unless the data
+    /// are `rubbing`: where friction rules, the load would have the sign of the speed, and friction under load be any friction. So
+    /// would that friction itself be load beside other friction of its joint. The law counts it all. The torque is predicted without the measured effort,
     /// whose noise would explain itself; only play is crossed as that effort drives its rotor.
     ///
     /// # Errors
@@ -141,7 +141,7 @@ impl Data<'_> {
     }
 
     /// The problem of some candidates alone, linear about the parameters that fit best, and the fit (Gauss–Newton in the
-    /// knobs, chords in what else bends; friction under load about the load of all that is no friction).
+    /// knobs, chords in what else bends; friction under load about the load that [`Data::loaded`] tells).
     ///
     /// # Errors
     /// An effect that the robot cannot have.

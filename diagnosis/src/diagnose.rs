@@ -331,7 +331,8 @@ impl Logs<'_> {
         let everything = |_: usize| true;
         let squares = |rows: &Rows| gap::squares(&self.band, rows, everything);
         let floor_rms = gap::weighted_floor(&floor, &weights);
-        let torque = gap::change(&squares(&before.rows), &squares(&after.rows), &weights, floor_rms);
+        let change = |after: &Rows| gap::change(&squares(&before.rows), &squares(after), &weights, floor_rms);
+        let torque = change(&after.rows);
         let (one_step, rollout) = before.errors.change(&after.errors, &weights);
         progress("networks", 0.95);
         let learned = learner::learn(&self.signals, &self.band, &weights, &before.rows, &after.rows);
@@ -367,7 +368,7 @@ impl Logs<'_> {
         let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());
         // What a law outside the catalogue accounts for does not speak against the effects beside it.
         let misfit = (verdict != Verdict::Explained).then_some(&beside);
-        let found = self.found_effects(chosen, rivals, &torque, misfit, &weights)?;
+        let found = self.found_effects(chosen, rivals, misfit, change)?;
         let corrected = Corrected {
             schema: MODEL_SCHEMA.to_owned(),
             robot: model.name().to_owned(),
@@ -430,9 +431,8 @@ impl Logs<'_> {
         &self,
         chosen: &Chosen,
         rivals: &[Rival],
-        torque: &Change,
         misfit: Option<&Judged>,
-        weights: &[f64],
+        change: impl Fn(&Rows) -> Change,
     ) -> Result<Vec<FoundEffect>, EffectError> {
         let (problem, fit) = (&chosen.exact, &chosen.fit);
         let kinds = select::kinds(problem, &fit.set);
@@ -440,10 +440,7 @@ impl Logs<'_> {
         let mut found = Vec::new();
         for (effect, own) in fit.effects_with_candidates(problem, self.model) {
             let kind = effect.kind();
-            let alone = self.held_out(problem, &own, false)?;
-            let sums = gap::total(&gap::squares(&self.band, &alone.rows, |_| true));
-            let shrink =
-                torque.shrink.zip(torque.before).map(|(_, before)| 1.0 - gap::weighted_rms(&sums, weights) / before);
+            let alone = change(&self.held_out(problem, &own, false)?.rows);
             let turned = chosen.turned.as_ref().filter(|t| t.drive.kind == kind);
             // The choice sees a drive by its rotor.
             let seen_as = if turned.is_some() { Kind::Armature } else { kind };
@@ -475,7 +472,7 @@ impl Logs<'_> {
                     confidence: calibrated((1.0 - doubt) * (1.0 - misfit).powi(MISFIT)),
                     parameters: fit.parameters(problem, self.model, kind, &own, &speeds),
                     indistinguishable_from: confused,
-                    shrink: EffectShrink { torque: shrink },
+                    shrink: EffectShrink { torque: alone.shrink, ci95: alone.ci95 },
                 },
             ));
         }

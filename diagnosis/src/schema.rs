@@ -216,6 +216,9 @@ pub enum Quantity {
 pub struct EffectShrink {
     /// 1 − after/before with this effect alone in the model; `None` where the gap is at the floor.
     pub torque: Option<f64>,
+    /// 95 % interval of `torque`; `None` where it is, or where there are too few blocks of time to tell.
+    #[serde(default)]
+    pub ci95: Option<[f64; 2]>,
 }
 
 /// Another set of effects that could be behind the gap.

@@ -1,7 +1,7 @@
 //! The table of effects found: what, where, how sure, how much.
 
 use super::chart::short;
-use super::format::{self, percent, with_unit};
+use super::format::{self, percent, percent_interval, with_unit};
 use super::words;
 use gapscope_diagnosis::schema::{Diagnosis, Estimate, FoundEffect, Parameter};
 use maud::{Markup, html};
@@ -23,7 +23,7 @@ pub fn render(diagnosis: &Diagnosis) -> Markup {
                     th scope="col" { "effect" }
                     th scope="col" { "joints" }
                     th scope="col" { "confidence" }
-                    th.number scope="col" { "alone, torque gap shrinks by" }
+                    th.number scope="col" { "alone, torque gap shrinks by" span.muted { " [95 %]" } }
                     th scope="col" { "cannot be told from" }
                 }
             }
@@ -46,6 +46,7 @@ fn row(effect: &FoundEffect, all: &[String]) -> Markup {
                 td.nowrap data-label="confidence" { (meter(effect.confidence)) " " (format::probability_figure(effect.confidence)) "\u{202f}%" }
                 td.number data-label="alone, torque gap shrinks by" {
                     (effect.shrink.torque.map_or("at the floor".into(), percent))
+                    @if let Some(interval) = effect.shrink.ci95 { " " span.muted.nowrap { (percent_interval(interval)) } }
                 }
                 td data-label="cannot be told from" {
                     @if apart.is_empty() { span.muted { "nothing" } } @else { (apart.join(", ")) }

@@ -46,7 +46,7 @@ pub fn found(
         confidence,
         parameters: parameters.iter().map(|(name, p)| ((*name).to_string(), p.clone())).collect(),
         indistinguishable_from: vec![],
-        shrink: EffectShrink { torque: Some(shrink) },
+        shrink: EffectShrink { torque: Some(shrink), ci95: Some([shrink - 0.02, shrink + 0.02]) },
     }
 }
 

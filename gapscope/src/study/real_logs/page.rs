@@ -123,10 +123,11 @@ fn confidence(one: &FoundEffect) -> String {
     let ties: Vec<String> = one.indistinguishable_from.iter().map(|kind| effect(kind)).collect();
     let ties =
         if ties.is_empty() { String::new() } else { format!("; these logs cannot tell it from {}", ties.join(", ")) };
+    let interval = one.shrink.ci95.map_or(String::new(), |interval| format!(" ({})", percent_interval(interval)));
     let alone = one
         .shrink
         .torque
-        .map_or(String::new(), |part| format!(", alone it shrinks the torque gap by {}", percent(part)));
+        .map_or(String::new(), |part| format!(", alone it shrinks the torque gap by {}{interval}", percent(part)));
     format!("- {}: confidence {} %{alone}{ties}.\n", capital(&effect(&one.kind)), probability_figure(one.confidence))
 }
 

@@ -123,8 +123,10 @@ fn assert_finds(outcome: &Outcome, truth: &[Effect]) {
     for effect in truth {
         let found = diagnosis.effects.iter().find(|e| e.kind == effect.kind().name()).unwrap();
         assert!(found.confidence > 0.9, "{}", summary(diagnosis));
+        let (own, [low, high]) = (found.shrink.torque.unwrap(), found.shrink.ci95.unwrap());
+        assert!(low <= own && own <= high, "{own} in {low} to {high}");
         if truth.len() == 1 {
-            assert!(found.shrink.torque.unwrap() > 0.9, "{}", summary(diagnosis));
+            assert!(own > 0.9 && low > 0.8, "{}", summary(diagnosis));
         }
         for parameter in effect.law().parameters() {
             // A body's own inertia, and a link's components near the base, hardly show in the torque.

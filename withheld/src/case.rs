@@ -106,32 +106,44 @@ fn attempt(
     let recipe = Recipe { seconds: spec.seconds, motor_encoders, sensors, ..Recipe::default() };
     let quiet = Recipe { sensors: Sensors::IDEAL, ..recipe };
     let seeds: Vec<u64> = (0..=count).map(|_| random.random()).collect();
+    let speeds: Vec<f64> = (0..count).map(|_| SPEED.choose(random).copied().unwrap_or(1.0)).collect();
+    let run = |drawn: &[Drawn], episode: usize, recipe: &Recipe| {
+        simulate(robot, drawn, episode, seeds[episode], &Recipe { speed: speeds[episode], ..*recipe })
+    };
 
     let saturated = drawn.iter().position(|d| d.sealed.kind == Kind::TorqueSaturation.name());
     let mut limit = None;
     if let Some(which) = saturated {
-        let log = simulate(robot, &drawn, 0, seeds[count], &quiet)?;
-        let joint = strongest(&log, random);
+        // The logs and the sealed ones both reach it: where they do not, nothing is left to shrink, and no prediction of it can
+        // come true.
+        let logs: Vec<Episode> = (0..count).map(|episode| run(&drawn, episode, &quiet)).collect::<Result<_, _>>()?;
+        let joint = strongest(&logs[0], random);
         let share = 1.0 - drawn[which].sealed.parameters.get("quantile").and_then(Value::as_f64).unwrap_or(0.9);
         let quantile = 1.0 - clip * share;
         drawn[which].sealed.parameters.insert("quantile".into(), quantile.into());
-        let mut sizes: Vec<f64> = log.effort[joint].iter().map(|effort| effort.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let at = sizes[(quantile * (sizes.len() - 1) as f64).round() as usize];
+        let (episodes, tests) = logs.split_at(spec.episodes);
+        let at = [episodes, tests]
+            .into_iter()
+            .filter_map(|logs| {
+                let mut sizes: Vec<f64> =
+                    logs.iter().flat_map(|log| &log.effort[joint]).map(|effort| effort.abs()).collect();
+                sizes.sort_by(f64::total_cmp);
+                let last = sizes.len().checked_sub(1)?;
+                Some(sizes[(quantile * last as f64).round() as usize])
+            })
+            .fold(f64::INFINITY, f64::min);
         drawn[which].saturate(robot, joint, at);
         limit = Some((joint, at));
     }
 
     let mut logs = Vec::with_capacity(count);
-    for (episode, seed) in seeds[..count].iter().enumerate() {
-        let speed = SPEED.choose(random).copied().unwrap_or(1.0);
-        let log = simulate(robot, &drawn, episode, *seed, &Recipe { speed, ..recipe })?;
+    for episode in 0..count {
+        let log = run(&drawn, episode, &recipe)?;
         if strays(&log) {
             return Ok(None);
         }
         logs.push(log);
     }
-    // Where the sealed motions never reach a limit, nothing is left to shrink there, and no prediction of it can come true.
     let bites =
         |logs: &[Episode]| limit.is_none_or(|(joint, limit)| logs.is_empty() || clipped(logs, joint, limit) >= CLIPPED);
     let (episodes, tests) = logs.split_at(spec.episodes);

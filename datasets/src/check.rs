@@ -8,6 +8,8 @@ mod signal;
 mod units;
 mod velocity;
 
+pub(crate) use signal::spikes;
+
 use crate::episode::Episode;
 use gapscope_dynamics::{Finding, Model};
 

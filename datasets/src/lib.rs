@@ -15,6 +15,7 @@ mod error;
 mod generate;
 mod header;
 mod interpolate;
+mod mend;
 mod perturb;
 mod read;
 mod reference;

@@ -64,10 +64,11 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Signals of an episode; `None` where it is shorter than the kernel.
+    /// Signals of an episode, its position's glitches mended; `None` where it is shorter than the kernel.
     pub fn new(model: &Model, episode: &Episode) -> Option<Signals> {
+        let (episode, _) = episode.without_glitches();
         let dt = 1.0 / episode.rate();
-        let raw = resample(episode, dt);
+        let raw = resample(&episode, dt);
         let kernel = derivative_kernel(dt);
         let samples = raw.position.first().map_or(0, Vec::len);
         let first = kernel.reach + 1;

@@ -38,7 +38,7 @@ pub(super) fn check(logs: &Logs, scale: Option<&[f64]>, report: &mut Report) {
     report.add(&fast, |value| {
         format!("the speed reaches {value} times the URDF's velocity limit: the limit is not that of this robot, or the unit of position or time is another")
     });
-    report.add(&glitches, |value| format!("the position has single samples that jump ({value} in a log): a reading went wrong there; take them out, or replace them by the mean of their neighbours"));
+    report.add(&glitches, |value| format!("the position has single samples that jump ({value} in a log): a reading went wrong there; a diagnosis takes the course of their neighbours instead"));
     report.add(&wraps, |value| {
         format!("the position jumps by about a full turn ({value} times in a log): the angle is wrapped; unwrap it")
     });

@@ -108,6 +108,14 @@ pub(super) fn trimmed_rms(values: &[f64]) -> f64 {
     rms(&magnitudes) / 0.871
 }
 
+/// Isolated spikes of a signal, each with what it is off the cubic through its neighbours.
+pub(crate) fn spikes(time: &[f64], value: &[f64]) -> Vec<(usize, f64)> {
+    let errors = prediction_errors(time, value);
+    let (low, high) = range(&without_spikes(value));
+    let found = glitches(&errors, value, raster(value).unwrap_or(0.0), high - low);
+    found.into_iter().map(|k| (k, errors[k])).collect()
+}
+
 /// Isolated spikes: a sample far off the cubic through its neighbours, which in turn are off theirs by the share that
 /// a spike there leaves (−2/3 of it).
 fn glitches(errors: &[f64], value: &[f64], step: f64, range: f64) -> Vec<usize> {

@@ -5,6 +5,7 @@ mod bank_sample;
 mod break_away;
 mod diagnosis;
 mod drives;
+mod hardships;
 mod late;
 mod learning;
 mod limits;

@@ -1,4 +1,4 @@
-//! Logs as robots give them: glitches, coarse or noisy sensors, a jittering clock, lost samples, velocities late or lacking,
+//! Logs as robots give them: jumping readings, coarse or noisy sensors, a jittering clock, lost samples, velocities late or lacking,
 //! slow motion, motion one way, one short run or fifty. Friction and a payload are put into an arm, and are named all the same.
 
 use gapscope_datasets::{Episode, Recipe, Reference, Sensors, Trajectory, follow, generate};
@@ -70,15 +70,13 @@ fn told_of(diagnosis: &Diagnosis) -> String {
 }
 
 #[test]
-fn single_samples_that_are_far_out() {
+fn positions_that_jump_for_a_sample() {
     let mut logs = logs(3, &ordinary());
     let mut random = Pcg64::seed_from_u64(3);
     for log in &mut logs {
         for _ in 0..5 {
             let (joint, k) = (random.random_range(0..6), random.random_range(50..1950));
             log.position[joint][k] += 0.02;
-            let (joint, k) = (random.random_range(0..6), random.random_range(50..1950));
-            log.effort[joint][k] *= -3.0;
         }
     }
     told(&logs, 0.03);

@@ -186,7 +186,7 @@ fn single_samples_that_jump() {
         run.position[1][2000] -= 0.5;
         run.position[1][3000] = 0.0;
     });
-    assert!(line.contains("mean of their neighbours"), "{line}");
+    assert!(line.contains("the course of their neighbours"), "{line}");
 }
 
 #[test]

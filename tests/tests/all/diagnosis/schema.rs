@@ -87,7 +87,7 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
     assert_eq!(effects.len(), 3);
     for effect in effects {
         assert_keys(effect, &["kind", "joints", "confidence", "parameters", "indistinguishable_from", "shrink"], &[]);
-        assert_keys(&effect["shrink"], &["torque"], &[]);
+        assert_keys(&effect["shrink"], &["torque"], &["ci95"]);
         assert!((0.0..=1.0).contains(&effect["confidence"].as_f64().unwrap()));
     }
     let of = |kind: &str| effects.iter().find(|e| e["kind"] == kind).unwrap();

@@ -8,7 +8,7 @@ mod signal;
 mod units;
 mod velocity;
 
-pub(crate) use signal::spikes;
+pub(crate) use signal::Traits;
 
 use crate::episode::Episode;
 use gapscope_dynamics::{Finding, Model};

@@ -1,21 +1,20 @@
 //! Readings that went wrong, replaced by what the samples about them say.
 
-use crate::check::spikes;
+use crate::check::Traits;
 use crate::episode::Episode;
 
 impl Episode {
     /// The log with the position's isolated spikes (those that [`crate::check_logs`] finds) replaced by the cubic through the
-    /// two samples on either side, and how many there were. Nothing else is touched: an effort may well act for one sample.
+    /// two samples on either side. Nothing else is touched: an effort may well act for one sample.
     #[must_use]
-    pub fn without_glitches(&self) -> (Episode, usize) {
+    pub fn without_glitches(&self) -> Episode {
         let mut mended = self.clone();
-        let mut count = 0;
         for position in &mut mended.position {
-            let found = spikes(&self.time, position);
-            found.iter().for_each(|&(k, off)| position[k] -= off);
-            count += found.len();
+            for (k, off) in Traits::of(&self.time, position, self.dt()).glitches {
+                position[k] -= off;
+            }
         }
-        (mended, count)
+        mended
     }
 }
 
@@ -33,12 +32,11 @@ mod tests {
     #[test]
     fn a_spike_goes_and_all_else_stays() {
         let clean = log();
-        assert_eq!(clean.without_glitches(), (clean.clone(), 0));
+        assert_eq!(clean.without_glitches(), clean);
         let mut spiked = log();
         spiked.position[1][500] += 0.02;
         spiked.effort[0][300] = 50.0;
-        let (mended, count) = spiked.without_glitches();
-        assert_eq!(count, 1);
+        let mended = spiked.without_glitches();
         assert!((mended.position[1][500] - clean.position[1][500]).abs() < 1e-6);
         spiked.position[1][500] = mended.position[1][500];
         assert_eq!(mended, spiked);
@@ -50,6 +48,16 @@ mod tests {
         log.position[0][400..].iter_mut().for_each(|q| *q += 0.01);
         log.position[1][700] += 0.02;
         log.position[1][701] += 0.02;
-        assert_eq!(log.without_glitches(), (log.clone(), 0));
+        assert_eq!(log.without_glitches(), log);
+    }
+
+    #[test]
+    fn a_log_of_few_samples_stays_as_it_is() {
+        for samples in 0..8 {
+            let mut log = log();
+            log.time.truncate(samples);
+            log.position.iter_mut().chain(&mut log.effort).for_each(|x| x.truncate(samples));
+            assert_eq!(log.without_glitches(), log);
+        }
     }
 }

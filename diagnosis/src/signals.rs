@@ -66,7 +66,7 @@ pub struct Signals {
 impl Signals {
     /// Signals of an episode, its position's glitches mended; `None` where it is shorter than the kernel.
     pub fn new(model: &Model, episode: &Episode) -> Option<Signals> {
-        let (episode, _) = episode.without_glitches();
+        let episode = episode.without_glitches();
         let dt = 1.0 / episode.rate();
         let raw = resample(&episode, dt);
         let kernel = derivative_kernel(dt);

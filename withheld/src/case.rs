@@ -122,16 +122,7 @@ fn attempt(
         let quantile = 1.0 - clip * share;
         drawn[which].sealed.parameters.insert("quantile".into(), quantile.into());
         let (episodes, tests) = logs.split_at(spec.episodes);
-        let at = [episodes, tests]
-            .into_iter()
-            .filter_map(|logs| {
-                let mut sizes: Vec<f64> =
-                    logs.iter().flat_map(|log| &log.effort[joint]).map(|effort| effort.abs()).collect();
-                sizes.sort_by(f64::total_cmp);
-                let last = sizes.len().checked_sub(1)?;
-                Some(sizes[(quantile * last as f64).round() as usize])
-            })
-            .fold(f64::INFINITY, f64::min);
+        let at = size(episodes, joint, quantile).min(size(tests, joint, quantile));
         drawn[which].saturate(robot, joint, at);
         limit = Some((joint, at));
     }
@@ -229,6 +220,14 @@ fn strongest(log: &Episode, random: &mut Pcg64) -> usize {
 fn strays(log: &Episode) -> bool {
     let command = log.command.iter().flatten();
     command.zip(&log.position).any(|(command, q)| command.iter().zip(q).any(|(c, q)| (c - q).abs() > ASTRAY))
+}
+
+/// A quantile of the size of a joint's effort in some logs, N m or N; infinite without logs.
+fn size(logs: &[Episode], joint: usize, quantile: f64) -> f64 {
+    let mut sizes: Vec<f64> = logs.iter().flat_map(|log| &log.effort[joint]).map(|effort| effort.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let last = sizes.len().saturating_sub(1) as f64;
+    sizes.get((quantile * last).round() as usize).copied().unwrap_or(f64::INFINITY)
 }
 
 /// Share of the samples whose effort is beyond a limit.

@@ -8,7 +8,7 @@ const WINDOW_SAMPLES: usize = 6;
 
 /// What a joint's position in one log looks like.
 #[derive(Debug, Clone)]
-pub(super) struct Traits {
+pub(crate) struct Traits {
     /// Least and greatest value.
     pub low: f64,
     pub high: f64,
@@ -16,8 +16,8 @@ pub(super) struct Traits {
     pub noise: f64,
     /// Encoder step, where the values lie on a coarse raster.
     pub step: Option<f64>,
-    /// Samples that stand alone as spikes.
-    pub glitches: Vec<usize>,
+    /// Samples that stand alone as spikes, each with what it is off the cubic through its neighbours.
+    pub glitches: Vec<(usize, f64)>,
     /// Samples at which the angle jumps by about a full turn.
     pub wraps: Vec<usize>,
     /// The signal without single spikes: the median of each sample and its neighbours.
@@ -45,7 +45,8 @@ impl Traits {
         let glitches = glitches(&errors, value, step.unwrap_or(0.0), high - low);
         let wraps = (1..value.len())
             .filter(|&k| {
-                (value[k] - value[k - 1]).abs() > 5.5 && !glitches.contains(&k) && !glitches.contains(&(k - 1))
+                let glitch = glitches.iter().any(|&(glitch, _)| glitch == k || glitch + 1 == k);
+                (value[k] - value[k - 1]).abs() > 5.5 && !glitch
             })
             .collect();
         Self { low, high, noise, step, glitches, wraps, smooth, speed, window }
@@ -108,17 +109,9 @@ pub(super) fn trimmed_rms(values: &[f64]) -> f64 {
     rms(&magnitudes) / 0.871
 }
 
-/// Isolated spikes of a signal, each with what it is off the cubic through its neighbours.
-pub(crate) fn spikes(time: &[f64], value: &[f64]) -> Vec<(usize, f64)> {
-    let errors = prediction_errors(time, value);
-    let (low, high) = range(&without_spikes(value));
-    let found = glitches(&errors, value, raster(value).unwrap_or(0.0), high - low);
-    found.into_iter().map(|k| (k, errors[k])).collect()
-}
-
 /// Isolated spikes: a sample far off the cubic through its neighbours, which in turn are off theirs by the share that
-/// a spike there leaves (−2/3 of it).
-fn glitches(errors: &[f64], value: &[f64], step: f64, range: f64) -> Vec<usize> {
+/// a spike there leaves (−2/3 of it). Each with what it is off.
+fn glitches(errors: &[f64], value: &[f64], step: f64, range: f64) -> Vec<(usize, f64)> {
     const NEAR: usize = 40;
     let floor = (4.0 * step).max(1e-4 * range).max(12.0 * robust_sigma(errors));
     let mut found = Vec::new();
@@ -137,7 +130,7 @@ fn glitches(errors: &[f64], value: &[f64], step: f64, range: f64) -> Vec<usize> 
         let outside = (low - value[k]).max(value[k] - high);
         if alone && spike > 12.0 * robust_sigma(&around) && spike > 3.0 * trimmed_rms(&around) && outside > 0.3 * spike
         {
-            found.push(k);
+            found.push((k, errors[k]));
         }
     }
     found
@@ -199,7 +192,8 @@ mod tests {
         }
         value[2500] = 0.0;
         let traits = Traits::of(&time, &value, 0.002);
-        assert_eq!(traits.glitches, [100, 1500, 1700, 2500]);
+        let places: Vec<usize> = traits.glitches.iter().map(|(k, _)| *k).collect();
+        assert_eq!(places, [100, 1500, 1700, 2500]);
         assert!((traits.smooth[1500] - value[1499]).abs() < 0.01);
     }
 

@@ -3,6 +3,7 @@
 use crate::band::Band;
 use crate::contact;
 use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
+use crate::drive::{Through, smooth};
 use crate::estimate::{Fit, speeds};
 use crate::evidence;
 use crate::experiment;
@@ -202,28 +203,7 @@ impl Logs<'_> {
         let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
         let side = problem.side(set);
         let n = self.model.dof();
-        let in_fold = |i: usize, fold: usize| self.band.rows[i].fold == fold;
-        let runs: Vec<(usize, usize)> = (0..self.signals.len())
-            .flat_map(|e| (0..self.band.folds).map(move |fold| (e, fold)))
-            .filter(|&(e, fold)| self.band.of_episode[e].clone().any(|i| in_fold(i, fold)))
-            .collect();
-        let filtered: Vec<Vec<Vec<f64>>> = runs
-            .par_iter()
-            .map(|&(e, fold)| {
-                let s = &self.signals[e];
-                let mut plant = plant_pushed(self.model, &effects[fold], side, s.dt, &s.pushed)?;
-                let rest = residual(&mut plant, self.model, s, &self.still, fits[fold].alignment());
-                Ok(rest.iter().map(|x| self.band.filter(e, x)).collect())
-            })
-            .collect::<Result<_, EffectError>>()?;
-        let mut rows: Rows = vec![vec![0.0; self.band.rows.len()]; n];
-        for (&(e, fold), filtered) in runs.iter().zip(&filtered) {
-            for (row, filtered) in rows.iter_mut().zip(filtered) {
-                for (i, value) in self.band.of_episode[e].clone().zip(filtered).filter(|(i, _)| in_fold(*i, fold)) {
-                    row[i] = *value;
-                }
-            }
-        }
+        let rows = self.held_out_through(problem, set, None)?;
         let mut steps = with_errors;
         for effects in &effects {
             steps &= horizon::can_step(&Plant::new(self.model, effects, 1e-3)?, &self.signals);
@@ -238,6 +218,46 @@ impl Logs<'_> {
         Ok(HeldOut { rows, errors })
     }
 
+    /// The residuals alone, that of one joint through a filter where there is one.
+    pub(crate) fn held_out_through(
+        &self,
+        problem: &Problem,
+        set: &[usize],
+        through: Option<Through>,
+    ) -> Result<Rows, EffectError> {
+        let fits = Fit::without_folds(problem, set);
+        let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
+        let side = problem.side(set);
+        let in_fold = |i: usize, fold: usize| self.band.rows[i].fold == fold;
+        let runs: Vec<(usize, usize)> = (0..self.signals.len())
+            .flat_map(|e| (0..self.band.folds).map(move |fold| (e, fold)))
+            .filter(|&(e, fold)| self.band.of_episode[e].clone().any(|i| in_fold(i, fold)))
+            .collect();
+        let filtered: Vec<Vec<Vec<f64>>> = runs
+            .par_iter()
+            .map(|&(e, fold)| {
+                let s = &self.signals[e];
+                let mut plant = plant_pushed(self.model, &effects[fold], side, s.dt, &s.pushed)?;
+                let rest = residual(&mut plant, self.model, s, &self.still, fits[fold].alignment());
+                Ok(rest.into_iter().enumerate().map(|(j, x)| self.filter_through(e, j, x, through)).collect())
+            })
+            .collect::<Result<_, EffectError>>()?;
+        let mut rows: Rows = vec![vec![0.0; self.band.rows.len()]; self.model.dof()];
+        for (&(e, fold), filtered) in runs.iter().zip(&filtered) {
+            for (row, filtered) in rows.iter_mut().zip(filtered) {
+                for (i, value) in self.band.of_episode[e].clone().zip(filtered).filter(|(i, _)| in_fold(*i, fold)) {
+                    row[i] = *value;
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    fn filter_through(&self, episode: usize, joint: usize, torque: Vec<f64>, through: Option<Through>) -> Vec<f64> {
+        let cutoff = through.filter(|through| through.joint == joint).map(|through| through.cutoff);
+        self.band.filter(episode, &smooth(torque, cutoff, self.signals[episode].dt))
+    }
+
     /// Held-out gap of a set, as a part of the effort's variation, beside what laws outside the catalogue in it account for.
     pub(crate) fn left(&self, problem: &Problem, set: &[usize]) -> Result<f64, EffectError> {
         let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
@@ -246,12 +266,18 @@ impl Logs<'_> {
 
     /// The same as sums of squares a joint, (N m)² or N², and the count of rows.
     pub(crate) fn left_by_joint(&self, problem: &Problem, set: &[usize]) -> Result<Vec<f64>, EffectError> {
-        let rows = self.beside_outside(problem, set, &self.held_out(problem, set, false)?.rows);
+        let rows = self.beside_outside(problem, set, &self.held_out(problem, set, false)?.rows, None);
         Ok(gap::total(&gap::squares(&self.band, &rows, |_| true)))
     }
 
     /// Held-out residuals of a set less what laws outside the catalogue in it account for.
-    pub(crate) fn beside_outside(&self, problem: &Problem, set: &[usize], rows: &Rows) -> Rows {
+    pub(crate) fn beside_outside(
+        &self,
+        problem: &Problem,
+        set: &[usize],
+        rows: &Rows,
+        through: Option<Through>,
+    ) -> Rows {
         let mut rows = rows.clone();
         let outside = problem.outside(set);
         if outside.is_empty() {
@@ -264,7 +290,8 @@ impl Logs<'_> {
                 let columns = problem.entries[c].candidate.columns(&s.motion(self.model, &self.still));
                 for (i, column) in columns.iter().enumerate() {
                     for (j, torque) in &column.rows {
-                        for (row, x) in self.band.of_episode[e].clone().zip(self.band.filter(e, torque)) {
+                        let torque = self.filter_through(e, *j, torque.clone(), through);
+                        for (row, x) in self.band.of_episode[e].clone().zip(torque) {
                             rows[*j][row] -= theta[self.band.rows[row].fold][i] * x;
                         }
                     }
@@ -362,7 +389,7 @@ impl Logs<'_> {
         };
         let turning = problem.turning(&fit.set);
         let judged = |after: &Rows| Judged::new(&sums(&before.rows), &sums(after), &floor, &concern, &turning);
-        let beside = judged(&self.beside_outside(problem, &fit.set, &after.rows));
+        let beside = judged(&self.beside_outside(problem, &fit.set, &after.rows, None));
         let judged = judged(&after.rows);
         let unexplained = judged.unexplained_fraction();
         let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());

@@ -4,7 +4,12 @@
 //! is looked at alone, all else of the robot along its measured motion, and each account of its drive is turned to where it
 //! leaves least. An account that swings with the noise of the position also explains some of it; what noise alone would
 //! leave is found by a second run with more of it, and taken off (a simulation of the error in the variables, Cook and
-//! Stefanski, J. Am. Stat. Assoc. 89(428) 1994).
+//! Stefanski, J. Am. Stat. Assoc. 89(428) 1994). Springs whose account multiplies the noise of the link's acceleration are
+//! looked for through a filter as well, see [`Through`].
+
+mod choice;
+
+pub(crate) use choice::STANDS_IN;
 
 use crate::band::Row;
 use crate::corrected::{aligned, plant_pushed};
@@ -21,11 +26,13 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
+use std::borrow::{Borrow, Cow};
+use std::f64::consts::TAU;
 
 /// Resonances of the link on its locked motor that are tried first, Hz.
 const RESONANCE: [f64; 6] = [2.0, 3.0, 4.5, 6.5, 9.0, 13.0];
 /// Gaps that are tried first, rad or m: the basin of the true one is narrow.
-const GAP: [f64; 10] = [0.003, 0.0045, 0.0065, 0.0095, 0.013, 0.018, 0.025, 0.035, 0.05, 0.07];
+const GAP: [f64; 13] = [0.0004, 0.0008, 0.0016, 0.003, 0.0045, 0.0065, 0.0095, 0.013, 0.018, 0.025, 0.035, 0.05, 0.07];
 /// Rotors that are tried first with each, as parts of the inertia that they turn.
 const ROTOR: [f64; 7] = [0.1, 0.2, 0.33, 0.5, 0.7, 1.0, 1.4];
 /// The best so many of these pairs go on.
@@ -46,6 +53,8 @@ const PART: f64 = 0.85;
 /// few of them.
 const OF_NOISE: f64 = 0.25;
 pub(crate) const NOTHING: f64 = 1e-3;
+/// What is looked for through a filter, see [`Through`].
+const FILTERED: (Kind, EncoderSide) = (Kind::JointElasticity, EncoderSide::Link);
 /// Resonances, Hz, between which a spring is one that somebody would build and that these logs could show.
 const SOFTEST: f64 = 1.5;
 const STIFFEST: f64 = 20.0;
@@ -62,6 +71,8 @@ pub(crate) struct Account {
     pub drive: Candidate,
     /// By how many standard errors it is better.
     pub beyond: f64,
+    /// The filter through which it is.
+    pub through: Option<Through>,
 }
 
 /// One joint in all logs, and the same with more noise.
@@ -70,12 +81,49 @@ struct Study<'a> {
     joint: usize,
     runs: Vec<&'a JointRun>,
     noisier: Vec<JointRun>,
-    /// Mean square that counts as nothing, (N m)².
-    nothing: f64,
-    /// Mean square of the noise in each block as a rigid drive has it, (N m)².
-    noise: Vec<f64>,
     /// Inertia of the robot about the joint, kg m² (kg).
     inertia: f64,
+    /// Rotor with which a rigid drive leaves least, kg m² (kg).
+    rotor: f64,
+    /// Mean square of the effort that counts as nothing, (N m)².
+    unnoticed: f64,
+    /// What a rigid drive leaves of all episodes.
+    rigid: Rigid,
+    /// Whether springs are held against a rigid drive through a filter, and nothing else is tried.
+    through: bool,
+}
+
+/// How what is left is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct View {
+    /// One episode alone.
+    episode: Option<usize>,
+    /// Through a low-pass filter of this cut-off, rad/s.
+    smooth: Option<f64>,
+}
+
+/// A filter through which an account of a drive is held against a rigid one.
+///
+/// A spring behind an encoder on the link is told by the torque that the rotor takes as the spring winds up, which grows
+/// with the fourth power of the frequency, and so does noise: above the resonance of rotor and link on the spring it
+/// drowns what both accounts leave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Through {
+    /// The joint whose torque goes through it.
+    pub joint: usize,
+    /// Its cut-off, rad/s.
+    pub cutoff: f64,
+}
+
+/// What a rigid drive leaves in a view, block by block, (N m)²: accounts are held against it.
+#[derive(Debug, Clone, Default)]
+struct Rigid {
+    /// Of that, noise.
+    noise: Vec<f64>,
+    /// Mean square that counts as nothing.
+    nothing: f64,
+    /// Beyond noise and nothing.
+    left: Vec<f64>,
 }
 
 impl Logs<'_> {
@@ -86,11 +134,20 @@ impl Logs<'_> {
         joints: &[usize],
         problem: &Problem,
         others: &Fit,
+        through: bool,
     ) -> Result<Vec<Account>, EffectError> {
+        let runs = self.joint_runs(problem, others)?;
+        let mut found: Vec<Account> =
+            joints.par_iter().filter_map(|&j| Study::new(self, &runs, j, through).best()).collect();
+        found.sort_by(|a, b| b.beyond.total_cmp(&a.beyond));
+        Ok(found)
+    }
+
+    /// What effects leave of each joint in each log, their drives still open.
+    pub(crate) fn joint_runs(&self, problem: &Problem, others: &Fit) -> Result<Vec<Vec<JointRun>>, EffectError> {
         let effects = others.effects(problem, self.model);
         let outside = problem.outside(&others.set);
-        let runs: Vec<Vec<JointRun>> = self
-            .signals
+        self.signals
             .par_iter()
             .map(|s| {
                 let mut plant = plant_pushed(self.model, &effects, EncoderSide::Link, s.dt, &s.pushed)?;
@@ -107,21 +164,28 @@ impl Logs<'_> {
                 }
                 Ok(runs)
             })
-            .collect::<Result<_, EffectError>>()?;
-        let mut found: Vec<Account> = joints.par_iter().filter_map(|&j| Study::new(self, &runs, j).best()).collect();
-        found.sort_by(|a, b| b.beyond.total_cmp(&a.beyond));
-        Ok(found)
+            .collect()
     }
 }
 
 impl<'a> Study<'a> {
-    fn new(logs: &'a Logs<'a>, runs: &'a [Vec<JointRun>], joint: usize) -> Study<'a> {
+    fn new(logs: &'a Logs<'a>, runs: &'a [Vec<JointRun>], joint: usize, through: bool) -> Study<'a> {
         let runs: Vec<&JointRun> = runs.iter().map(|joints| &joints[joint]).collect();
         let inertia = mean(&runs.iter().map(|run| mean(&run.inertia)).collect::<Vec<_>>());
-        let mut study = Study { logs, joint, runs, noisier: Vec::new(), nothing: 0.0, noise: Vec::new(), inertia };
+        let mut study = Study {
+            logs,
+            joint,
+            runs,
+            noisier: Vec::new(),
+            inertia,
+            rotor: 0.0,
+            unnoticed: 0.0,
+            rigid: Rigid::default(),
+            through,
+        };
         let rigid = Candidate::new(Kind::Armature, vec![joint]);
-        let rotor = study.rotor(&rigid);
-        let rest: Vec<Vec<f64>> = study.runs.iter().map(|run| run.left_by(&rigid, rotor)).collect();
+        study.rotor = study.least_squares_rotor(&rigid);
+        let rest: Vec<Vec<f64>> = study.runs.iter().map(|run| run.left_by(&rigid, study.rotor)).collect();
         // What is white of the effort, and not taken up by the motion, is noise of its measurement.
         let alone: Vec<Vec<Vec<f64>>> = rest.iter().map(|rest| vec![rest.clone()]).collect();
         let floor = noise_floor(&logs.signals, &logs.band, &alone, 1, 0.0)[0];
@@ -139,27 +203,29 @@ impl<'a> Study<'a> {
                 noisier(s, run, s.position_noise[joint], white(s), seed)
             })
             .collect();
-        study.noise = study.noise(&rigid, rotor, &study.rows(&rigid, rotor));
         let effort = mean(&logs.signals.iter().map(|s| mean_square(&s.tau[joint])).collect::<Vec<_>>());
-        study.nothing = OF_NOISE * mean(&study.noise) + NOTHING * NOTHING * effort;
+        study.unnoticed = NOTHING * NOTHING * effort;
+        study.rigid = study.rigid_in(View::default());
+        study.rotor = study.turn(rigid, study.rotor).1;
+        study.rigid = study.rigid_in(View::default());
         study
     }
 
     fn best(&self) -> Option<Account> {
-        let rigid = Candidate::new(Kind::Armature, vec![self.joint]);
-        let rotor = self.rotor(&rigid);
-        let (_, rigid_rotor) = self.turn(rigid.clone(), rotor);
-        let without = self.left(&rigid, rigid_rotor);
-        if without.iter().filter(|left| **left > 2.0 * self.nothing).count() < LEAST_TELLING {
+        if !tells(&self.rigid, &self.rigid.left) {
             return None;
         }
-        let rigid_measure = self.measure(&rigid, rigid_rotor);
-        let rest = self.rows(&rigid, rigid_rotor);
+        let rest =
+            self.rows(&self.runs, &Candidate::new(Kind::Armature, vec![self.joint]), self.rotor, View::default());
         let left_of = |e: usize| mean_square(&rest[self.logs.band.of_episode[e].clone()]);
-        let episode = (0..self.runs.len()).max_by(|&a, &b| left_of(a).total_cmp(&left_of(b))).unwrap_or(0);
+        let episode = (0..self.runs.len()).max_by(|&a, &b| left_of(a).total_cmp(&left_of(b)));
+        let first = self.rigid_in(View { episode, smooth: None });
         let mut best: Option<(f64, Candidate, f64)> = None;
         for side in [EncoderSide::Link, EncoderSide::Motor] {
             for (kind, grid) in [(Kind::JointElasticity, &RESONANCE[..]), (Kind::Backlash, &GAP)] {
+                if self.through && (kind, side) != FILTERED {
+                    continue;
+                }
                 let at = &|shape: f64| Candidate {
                     shape,
                     side,
@@ -168,11 +234,11 @@ impl<'a> Study<'a> {
                 };
                 let measured = |(drive, rotor): (Candidate, f64)| (self.measure(&drive, rotor), drive, rotor);
                 // Where most of the time is spent in the gap, the rotor of a rigid drive is far off.
-                let rotors = || ROTOR.iter().map(|part| part * self.inertia).chain([rigid_rotor]);
+                let rotors = || ROTOR.iter().map(|part| part * self.inertia).chain([self.rotor]);
                 let mut tried: Vec<(f64, Candidate, f64)> = grid
                     .iter()
                     .flat_map(|&shape| rotors().map(move |rotor| (at(shape), rotor)))
-                    .map(|(drive, rotor)| (self.first_measure(episode, &drive, rotor), drive, rotor))
+                    .map(|(drive, rotor)| (self.first_measure(episode, &first, &drive, rotor), drive, rotor))
                     .collect();
                 tried.sort_by(|a, b| a.0.total_cmp(&b.0));
                 tried.truncate(FIRST);
@@ -180,8 +246,10 @@ impl<'a> Study<'a> {
                     tried.iter().map(|(_, drive, rotor)| self.descend(drive.clone(), *rotor)).collect();
                 let tried = tried.into_iter().map(|(_, drive, rotor)| (drive, rotor)).chain(descended).map(measured);
                 let first = tried.min_by(|a, b| a.0.total_cmp(&b.0));
-                let Some((_, first, rotor)) = first.filter(|(least, ..)| *least < rigid_measure) else { continue };
+                let Some((_, first, rotor)) = first.filter(|(least, ..)| *least < 0.0) else { continue };
                 let (drive, rotor) = self.turn(first, rotor);
+                // Its own filter is another now.
+                let (drive, rotor) = if self.through { self.turn(drive, rotor) } else { (drive, rotor) };
                 let measure = self.measure(&drive, rotor);
                 if best.as_ref().is_none_or(|(least, ..)| measure < *least) {
                     best = Some((measure, drive, rotor));
@@ -189,25 +257,23 @@ impl<'a> Study<'a> {
             }
         }
         let (_, drive, rotor) = best?;
-        let with = self.left(&drive, rotor);
-        let gain = mean(&without.iter().zip(&with).map(|(r, d)| (r / d).ln()).collect::<Vec<_>>());
-        let telling: Vec<f64> = without
-            .iter()
-            .zip(&with)
-            .filter(|(r, d)| r.max(**d) > 2.0 * self.nothing)
-            .map(|(r, d)| (r / d).ln())
-            .collect();
-        let beyond = telling.iter().sum::<f64>() / mean_square(&telling).sqrt() / (telling.len().max(1) as f64).sqrt();
+        let rigid = self.against(&drive, rotor);
+        let beyond = beyond_doubt(&rigid, &self.left(&drive, rotor, &rigid))?;
         // At the edge of what a drive can be, it stands in for something else.
-        let possible = rotor > 1.1 * LIGHTEST * self.inertia
-            && (drive.kind != Kind::JointElasticity || (SOFTEST..STIFFEST).contains(&drive.shape));
+        let possible =
+            self.shows(rotor) && (drive.kind != Kind::JointElasticity || (SOFTEST..STIFFEST).contains(&drive.shape));
         let knob_error = self.error(&drive, rotor);
-        (possible && beyond > BEYOND_DOUBT && (gain > -PART.ln() || mean(&with) < PART * mean(&without)))
-            .then_some(Account { drive: Candidate { knob_error, ..drive }, beyond })
+        let through = self.view(&drive, rotor).smooth.map(|cutoff| Through { joint: self.joint, cutoff });
+        possible.then_some(Account { drive: Candidate { knob_error, ..drive }, beyond, through })
+    }
+
+    /// Whether a rotor is heavy enough for its drive to show.
+    fn shows(&self, rotor: f64) -> bool {
+        rotor > 1.1 * LIGHTEST * self.inertia
     }
 
     /// The rotor with which a rigid drive leaves least, by least squares.
-    fn rotor(&self, rigid: &Candidate) -> f64 {
+    fn least_squares_rotor(&self, rigid: &Candidate) -> f64 {
         let (mut product, mut square) = (0.0, 0.0);
         for run in &self.runs {
             for (rest, a) in run.left_by(rigid, 0.0).iter().zip(&run.acceleration) {
@@ -223,17 +289,20 @@ impl<'a> Study<'a> {
     /// blocks count by what is left of them.
     fn descend(&self, mut drive: Candidate, mut rotor: f64) -> (Candidate, f64) {
         let power = if drive.kind == Kind::JointElasticity { -0.5 } else { 1.0 };
+        let view = self.view(&drive, rotor);
+        let nothing = self.against(&drive, rotor).nothing;
         for _ in 0..DESCENTS {
-            let rest = self.rows(&drive, rotor);
+            let rest = self.rows(&self.runs, &drive, rotor, view);
             let mut size = vec![(0.0, 0.0); self.logs.band.blocks];
             for (row, rest) in self.logs.band.rows.iter().zip(&rest) {
                 size[row.block].0 += rest * rest;
                 size[row.block].1 += 1.0;
             }
-            let weight = |row: &Row| 1.0 / (size[row.block].0 / size[row.block].1 + self.nothing);
+            let weight = |row: &Row| 1.0 / (size[row.block].0 / size[row.block].1 + nothing);
             let by = 1.0 + STEPS.1;
-            let knob = self.rows(&Candidate { shape: drive.shape * by.powf(power), ..drive.clone() }, rotor);
-            let motor = self.rows(&drive, rotor * by);
+            let stiffer = Candidate { shape: drive.shape * by.powf(power), ..drive.clone() };
+            let knob = self.rows(&self.runs, &stiffer, rotor, view);
+            let motor = self.rows(&self.runs, &drive, rotor * by, view);
             let mut gram = Matrix2::zeros();
             let mut moment = Vector2::zeros();
             for (i, row) in self.logs.band.rows.iter().enumerate() {
@@ -249,18 +318,49 @@ impl<'a> Study<'a> {
         (drive, rotor)
     }
 
-    /// What a drive leaves at the rows of the band.
-    fn rows(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
-        self.rows_of(self.runs.iter().copied(), drive, rotor)
+    /// What a drive leaves at the rows of the band; nothing of the episodes that are not looked at.
+    fn rows(&self, runs: &[impl Borrow<JointRun>], drive: &Candidate, rotor: f64, view: View) -> Vec<f64> {
+        let mut rows = vec![0.0; self.logs.band.rows.len()];
+        for (e, run) in runs.iter().enumerate().filter(|(e, _)| view.episode.is_none_or(|only| only == *e)) {
+            let run: &JointRun = run.borrow();
+            let rest = smooth(run.left_by(drive, rotor), view.smooth, run.dt);
+            rows[self.logs.band.of_episode[e].clone()].copy_from_slice(&self.logs.band.filter(e, &rest));
+        }
+        rows
     }
 
-    fn rows_of<'r>(&self, runs: impl Iterator<Item = &'r JointRun>, drive: &Candidate, rotor: f64) -> Vec<f64> {
-        runs.enumerate().flat_map(|(e, run)| self.logs.band.filter(e, &run.left_by(drive, rotor))).collect()
+    /// How an account of the drive is held against a rigid one: springs, where a filter is asked for, through one that cuts
+    /// at the resonance of rotor and link on the spring.
+    fn view(&self, drive: &Candidate, rotor: f64) -> View {
+        let filtered = self.through && (drive.kind, drive.side) == FILTERED;
+        let resonance = || TAU * drive.shape * (1.0 + drive.inertia / rotor).sqrt();
+        View { episode: None, smooth: filtered.then(resonance) }
     }
 
-    /// Knob and rotor where a drive leaves least: a search along the two in steps that become smaller.
+    fn rigid_in(&self, view: View) -> Rigid {
+        let account = Candidate::new(Kind::Armature, vec![self.joint]);
+        let rest = self.rows(&self.runs, &account, self.rotor, view);
+        let noise = self.noise(&account, self.rotor, &rest, view);
+        let seen: Vec<f64> = noise.iter().copied().filter(|noise| *noise > 0.0).collect();
+        let nothing = OF_NOISE * mean(&seen) + self.unnoticed;
+        let mut rigid = Rigid { noise, nothing, left: Vec::new() };
+        rigid.left = self.beyond(rest, &taken_off(&rigid.noise, &rigid, view), nothing);
+        rigid
+    }
+
+    /// What a rigid drive leaves where an account of a drive is held against it.
+    fn against(&self, drive: &Candidate, rotor: f64) -> Cow<'_, Rigid> {
+        let view = self.view(drive, rotor);
+        if view.smooth.is_none() { Cow::Borrowed(&self.rigid) } else { Cow::Owned(self.rigid_in(view)) }
+    }
+
+    /// Knob and rotor where a drive leaves least: a search along the two in steps that become smaller, through the filter
+    /// of the first, as each through its own would favour those whose filter hides what they leave.
     fn turn(&self, drive: Candidate, rotor: f64) -> (Candidate, f64) {
-        let mut best = (self.measure(&drive, rotor), drive, rotor);
+        let view = self.view(&drive, rotor);
+        let rigid = self.against(&drive, rotor);
+        let level = |drive: &Candidate, rotor: f64| mean_logarithm(self.left_in(drive, rotor, &rigid, view));
+        let mut best = (level(&drive, rotor), drive, rotor);
         let mut step = STEPS.0;
         for _ in 0..MOVES {
             if step < STEPS.1 {
@@ -274,7 +374,7 @@ impl<'a> Study<'a> {
                 .into_iter()
                 .map(|(knob, by)| (Candidate { shape: knob * best.1.shape, ..best.1.clone() }, by * best.2))
                 .filter(|(_, rotor)| *rotor >= LIGHTEST * self.inertia)
-                .map(|(drive, rotor)| (self.measure(&drive, rotor), drive, rotor))
+                .map(|(drive, rotor)| (level(&drive, rotor), drive, rotor))
                 .find(|next| next.0 < best.0);
             match next {
                 Some(next) => best = next,
@@ -284,36 +384,41 @@ impl<'a> Study<'a> {
         (best.1, best.2)
     }
 
-    /// Mean logarithm of what is left of the blocks: a burst of chatter counts as one block that is off.
+    /// Mean logarithm of what is left of the blocks over what a rigid drive leaves: a burst of chatter counts as one block
+    /// that is off.
     fn measure(&self, drive: &Candidate, rotor: f64) -> f64 {
-        mean_logarithm(self.left(drive, rotor))
+        let rigid = self.against(drive, rotor);
+        mean_logarithm(self.left(drive, rotor, &rigid)) - mean_logarithm(&rigid.left)
     }
 
     /// A first look at the same: of one episode alone, and with a rigid drive's noise.
-    fn first_measure(&self, episode: usize, drive: &Candidate, rotor: f64) -> f64 {
-        let mut rows = vec![0.0; self.logs.band.rows.len()];
-        let rest = self.logs.band.filter(episode, &self.runs[episode].left_by(drive, rotor));
-        rows[self.logs.band.of_episode[episode].clone()].copy_from_slice(&rest);
-        mean_logarithm(self.beyond(rows, &self.noise))
+    fn first_measure(&self, episode: Option<usize>, plain: &Rigid, drive: &Candidate, rotor: f64) -> f64 {
+        let view = View { episode, ..self.view(drive, rotor) };
+        let rigid = if view.smooth.is_none() { Cow::Borrowed(plain) } else { Cow::Owned(self.rigid_in(view)) };
+        let noise = taken_off(&rigid.noise, &rigid, view);
+        let left = self.beyond(self.rows(&self.runs, drive, rotor, view), &noise, rigid.nothing);
+        mean_logarithm(&left) - mean_logarithm(&rigid.left)
     }
 
     /// Mean square of each block that a drive leaves beyond noise and nothing, (N m)².
-    fn left(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
-        let rest = self.rows(drive, rotor);
-        let noise = self.noise(drive, rotor, &rest);
-        // Play is so sensitive that noise might account for all of it: no more is taken off than of a rigid drive.
-        let noise: Vec<f64> = noise.iter().zip(&self.noise).map(|(noise, rigid)| noise.min(*rigid)).collect();
-        self.beyond(rest, &noise)
+    fn left(&self, drive: &Candidate, rotor: f64, rigid: &Rigid) -> Vec<f64> {
+        self.left_in(drive, rotor, rigid, self.view(drive, rotor))
     }
 
-    fn beyond(&self, rest: Vec<f64>, noise: &[f64]) -> Vec<f64> {
+    fn left_in(&self, drive: &Candidate, rotor: f64, rigid: &Rigid, view: View) -> Vec<f64> {
+        let rest = self.rows(&self.runs, drive, rotor, view);
+        let noise = taken_off(&self.noise(drive, rotor, &rest, view), rigid, view);
+        self.beyond(rest, &noise, rigid.nothing)
+    }
+
+    fn beyond(&self, rest: Vec<f64>, noise: &[f64], nothing: f64) -> Vec<f64> {
         let left = self.mean_squares(rest).into_iter().zip(noise);
-        left.map(|(left, noise)| (left - noise).max(0.0) + self.nothing).collect()
+        left.map(|(left, noise)| (left - noise).max(0.0) + nothing).collect()
     }
 
     /// Mean square of what more noise changes of a rest, in each block, (N m)².
-    fn noise(&self, drive: &Candidate, rotor: f64, rest: &[f64]) -> Vec<f64> {
-        let noisier = self.rows_of(self.noisier.iter(), drive, rotor);
+    fn noise(&self, drive: &Candidate, rotor: f64, rest: &[f64], view: View) -> Vec<f64> {
+        let noisier = self.rows(&self.noisier, drive, rotor, view);
         self.mean_squares(noisier.iter().zip(rest).map(|(noisier, rest)| noisier - rest).collect())
     }
 
@@ -324,16 +429,17 @@ impl<'a> Study<'a> {
 
     /// Standard error of the knob, the rotor free: sandwich over blocks.
     fn error(&self, drive: &Candidate, rotor: f64) -> f64 {
-        let rest = self.rows(drive, rotor);
+        let view = self.view(drive, rotor);
+        let rows = |drive: &Candidate, rotor: f64| self.rows(&self.runs, drive, rotor, view);
+        let rest = rows(drive, rotor);
         let slope = |step: f64, moved: Vec<f64>, back: Vec<f64>| -> Vec<f64> {
             moved.iter().zip(&back).map(|(m, b)| (m - b) / (2.0 * step)).collect()
         };
         let by = STEPS.1 * drive.shape;
-        let knob = |by: f64| self.rows(&Candidate { shape: drive.shape + by, ..drive.clone() }, rotor);
+        let knob = |by: f64| rows(&Candidate { shape: drive.shape + by, ..drive.clone() }, rotor);
         let knob = slope(by, knob(by), knob(-by));
         let by = STEPS.1 * rotor;
-        let rotor = slope(by, self.rows(drive, rotor + by), self.rows(drive, rotor - by));
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let rotor = slope(by, rows(drive, rotor + by), rows(drive, rotor - by));
         // The knob's slope less what the rotor could make up for.
         let part = dot(&knob, &rotor) / dot(&rotor, &rotor).max(f64::MIN_POSITIVE);
         let own: Vec<f64> = knob.iter().zip(&rotor).map(|(k, r)| k - part * r).collect();
@@ -343,6 +449,45 @@ impl<'a> Study<'a> {
         }
         dot(&scores, &scores).sqrt() / dot(&own, &own).max(f64::MIN_POSITIVE)
     }
+}
+
+/// Whether enough blocks of time show something, by what is left of each.
+fn tells(rigid: &Rigid, left: &[f64]) -> bool {
+    left.iter().filter(|left| **left > 2.0 * rigid.nothing).count() >= LEAST_TELLING
+}
+
+/// By how many standard errors less is left of the blocks with an account than by a rigid drive, where that is beyond
+/// doubt and worth it.
+fn beyond_doubt(rigid: &Rigid, with: &[f64]) -> Option<f64> {
+    let ratios = || rigid.left.iter().zip(with);
+    let gain = mean(&ratios().map(|(r, d)| (r / d).ln()).collect::<Vec<_>>());
+    let telling: Vec<f64> =
+        ratios().filter(|(r, d)| r.max(**d) > 2.0 * rigid.nothing).map(|(r, d)| (r / d).ln()).collect();
+    let beyond = telling.iter().sum::<f64>() / mean_square(&telling).sqrt() / (telling.len().max(1) as f64).sqrt();
+    (beyond > BEYOND_DOUBT && (gain > -PART.ln() || mean(with) < PART * mean(&rigid.left))).then_some(beyond)
+}
+
+/// What is taken off for the noise of an account: what a rigid drive has of it at most, as play is so sensitive that noise
+/// might account for all that it leaves; through a filter, where noise is nearly the same for both, what it has more.
+fn taken_off(noise: &[f64], rigid: &Rigid, view: View) -> Vec<f64> {
+    if view.smooth.is_some() {
+        return vec![mean(noise) - mean(&rigid.noise); noise.len()];
+    }
+    noise.iter().zip(&rigid.noise).map(|(noise, rigid)| noise.min(*rigid)).collect()
+}
+
+/// A signal through a low-pass filter: two first-order lags of the same cut-off, rad/s, in a row.
+pub(crate) fn smooth(mut x: Vec<f64>, cutoff: Option<f64>, dt: f64) -> Vec<f64> {
+    if let Some(cutoff) = cutoff {
+        let pass = -(-cutoff * dt).exp_m1();
+        let (mut once, mut twice) = (0.0, 0.0);
+        for x in &mut x {
+            once += pass * (*x - once);
+            twice += pass * (once - twice);
+            *x = twice;
+        }
+    }
+    x
 }
 
 /// A run in which a joint's position and effort have noise of some standard deviation once more.
@@ -365,12 +510,16 @@ fn noisier(s: &Signals, run: &JointRun, position: f64, effort: f64, seed: u64) -
     noisier
 }
 
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len().max(1) as f64
 }
 
-fn mean_logarithm(x: Vec<f64>) -> f64 {
-    let mean = mean(&x.into_iter().map(f64::ln).collect::<Vec<_>>());
+fn mean_logarithm(x: impl AsRef<[f64]>) -> f64 {
+    let mean = mean(&x.as_ref().iter().map(|x| x.ln()).collect::<Vec<_>>());
     if mean.is_finite() { mean } else { f64::INFINITY }
 }
 

@@ -3,7 +3,7 @@
 use crate::constancy;
 use crate::corrected::residual;
 use crate::diagnose::{Logs, Progress};
-use crate::drive::NOTHING;
+use crate::drive::STANDS_IN;
 use crate::estimate::Fit;
 use crate::floor::noise_floor;
 use crate::gap;
@@ -13,29 +13,16 @@ use crate::refine::Data;
 use crate::screen;
 use crate::select::{self, Choice};
 use crate::signals::Signals;
-use crate::verdict::{Judged, Level};
+use crate::verdict::Judged;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, EffectError, Kind, Plant, Range};
 use rayon::prelude::*;
-use statrs::function::erf::erfc;
 
 /// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
 const MANY: usize = 3;
 /// Laws outside the catalogue, limits that are reached now and then, and Stribeck friction for what motion alone shows as
 /// Coulomb friction are let in where with them this part of what is more than noise is left.
 const OPEN: f64 = 0.75;
-/// A drive is an account of its joint if with it this part of what the joint was left with is left, ...
-const OF_JOINT: f64 = 0.25;
-/// ... or so many times the noise, ...
-const OF_FLOOR: f64 = 3.0;
-/// ... or what is nobody's concern, as a part of the effort's variation. A resonance of its own takes half of anything that
-/// sways.
-const OF_EFFORT: f64 = 0.01;
-/// Where no more than noise is left of a joint, an account must be better by so many standard errors: one chance in twenty
-/// over the hundred or so knobs, sides and joints that are tried.
-const IN_NOISE: f64 = 3.3;
-/// Another account of a drive is better where it leaves this part of the gap.
-const BETTER: f64 = 0.95;
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
 /// Kinds that reach joints where they find nothing to explain, or with one coefficient for all that a joint carries can
@@ -49,27 +36,12 @@ const REACHING: [Kind; 6] = [
     Kind::ActuatorLag,
 ];
 
-/// Kinds that a first look may have taken for a drive that turns on its own; the rotor is part of it.
-const STANDS_IN: [Kind; 9] = [
-    Kind::Armature,
-    Kind::LinkInertiaError,
-    Kind::Payload,
-    Kind::TorqueGainError,
-    Kind::JointZeroOffset,
-    Kind::TorqueSaturation,
-    Kind::TorqueBias,
-    Kind::ParallelSpring,
-    Kind::GravityMisalignment,
-];
 /// Part of the effort's variation below which neither a drive nor a law outside the catalogue is looked for.
 const UNNOTICED: f64 = 2e-3;
 /// Part of the squared gap that must be left for a drive to be looked for near the noise floor.
 const ALL_BUT: f64 = 1e-3;
 /// What a kind more must take away, relative, where two sets with a drive are compared.
-const A_KIND: f64 = 0.02;
-/// Accounts of drives that are tried beside the whole set.
-const ACCOUNTS: usize = 2;
-
+pub(crate) const A_KIND: f64 = 0.02;
 /// What the search came to.
 pub(crate) struct Chosen {
     /// Every candidate, around the parameters found.
@@ -221,127 +193,6 @@ impl Logs<'_> {
         Ok(Chosen { choice, exact, fit, ..modest.chosen })
     }
 
-    /// Puts a spring or play in the drive of one of some joints where an account with it leaves less of that joint than the
-    /// set does, at its exact law: once beside all else that was found, and, unless hardly more than noise is left by that,
-    /// once without what may have stood in for it.
-    fn drive(&self, best: Chosen, joints: &[usize], progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        if joints.is_empty() {
-            return Ok(best);
-        }
-        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
-        let blocks = |chosen: &Chosen| -> Result<Vec<Vec<f64>>, EffectError> {
-            let rows = self.held_out(&chosen.exact, &chosen.fit.set, false)?.rows;
-            Ok(gap::squares(&self.band, &self.beside_outside(&chosen.exact, &chosen.fit.set, &rows), |_| true))
-        };
-        let kinds = |chosen: &Chosen| select::kinds(&chosen.exact, &chosen.fit.set).len() as f64;
-        let before = blocks(&best)?;
-        let mut better: Option<(f64, Chosen)> = None;
-        let mut settled = false;
-        let of = |kinds: &[Kind]| -> Vec<usize> {
-            let is = |&i: &usize| kinds.contains(&best.exact.entries[i].candidate.kind);
-            (0..best.exact.entries.len()).filter(is).collect()
-        };
-        let (rotors, stand_ins) = (of(&[Kind::Armature]), of(&STANDS_IN));
-        for gone in [&[Kind::Armature][..], &STANDS_IN] {
-            let all_but =
-                |out: &[usize]| (0..best.exact.entries.len()).filter(|i| !out.contains(i)).collect::<Vec<_>>();
-            let others = if gone == STANDS_IN {
-                if stand_ins == rotors {
-                    continue;
-                }
-                let rest: Vec<Candidate> =
-                    all_but(&stand_ins).into_iter().map(|i| best.exact.entries[i].candidate.clone()).collect();
-                self.data(&best.noise).refine(&rest)?
-            } else {
-                (best.exact.clone(), Fit { set: all_but(&rotors), ..best.fit.clone() })
-            };
-            for account in self.accounts(joints, &others.0, &others.1)?.into_iter().take(ACCOUNTS) {
-                let joint = account.drive.joints[0];
-                let own = gap::of_joint(&weights, joint);
-                let rest = gap::weighted_rms(&gap::total(&before), &own);
-                let floor = gap::weighted_floor(&best.noise, &own);
-                let more_than_noise = Level { before: rest, after: rest, floor }.leaves_any();
-                if !more_than_noise && account.beyond < IN_NOISE {
-                    continue;
-                }
-                let (all, place) = self.with_rotor(&best, joint);
-                let leaves = |c: usize| {
-                    let candidate = &all.entries[c].candidate;
-                    gone.contains(&candidate.kind) && (gone == STANDS_IN || candidate.joints.contains(&joint))
-                };
-                let mut set: Vec<usize> = best.choice.set.iter().copied().filter(|&c| !leaves(c)).collect();
-                set.push(place);
-                set.sort_unstable();
-                set.dedup();
-                let turned = Turned {
-                    place,
-                    drive: account.drive,
-                    doubt: 0.5 * erfc(account.beyond / std::f64::consts::SQRT_2),
-                };
-                let next = self.converge(all, set, best.noise.clone(), Some(turned), progress)?;
-                let there = next.exact.entries.iter().any(|e| e.candidate.turns());
-                let after = blocks(&next)?;
-                let typical = |weights: &[f64]| {
-                    (gap::mean_level(&before, weights, NOTHING), gap::mean_level(&after, weights, NOTHING))
-                };
-                let ((before, after), (own_before, own_after)) = (typical(&weights), typical(&own));
-                let own_floor = gap::weighted_floor(&next.noise, &own);
-                let enough = (OF_JOINT * own_before).max(OF_FLOOR * own_floor).max(OF_EFFORT);
-                if there && own_after < (BETTER * own_before).min(enough) && after <= before {
-                    let level = after * (1.0 + A_KIND * kinds(&next));
-                    if better.as_ref().is_none_or(|(least, _)| level < *least) {
-                        // Impacts that are not yet followed pass for noise: much of the joint's gap must be gone as well.
-                        settled = level < OF_FLOOR * gap::weighted_floor(&next.noise, &weights)
-                            && own_after < OF_JOINT * own_before;
-                        better = Some((level, next));
-                    }
-                    break;
-                }
-            }
-            if settled {
-                break;
-            }
-        }
-        Ok(better.map_or(best, |(_, better)| better))
-    }
-
-    /// All candidates of a choice, and among them the place of a joint's rotor, in case the choice was made without rotors.
-    fn with_rotor(&self, chosen: &Chosen, joint: usize) -> (Problem, usize) {
-        let rotor = Candidate::new(Kind::Armature, vec![joint]);
-        let entries = &chosen.all.entries;
-        if let Some(place) = entries.iter().position(|e| e.candidate == rotor) {
-            return (chosen.all.clone(), place);
-        }
-        let open = |candidate: Candidate| Term { candidate, tangent_at: None };
-        let candidates = entries.iter().map(|e| e.candidate.clone()).chain([rotor]);
-        (self.data(&chosen.noise).problem(candidates.map(open).collect(), &weighing()), entries.len())
-    }
-
-    /// A choice with a drive made anew among all laws, those outside the catalogue included, as they stand in `laws`; nothing
-    /// where they lack one of its set.
-    fn beside(
-        &self,
-        chosen: &Chosen,
-        turned: &Turned,
-        mut laws: Problem,
-        progress: Progress<'_>,
-    ) -> Result<Option<Chosen>, EffectError> {
-        let same = |a: &Candidate, b: &Candidate| a.kind == b.kind && a.joints == b.joints;
-        let place = |c: usize| {
-            let candidate = &chosen.all.entries[c].candidate;
-            let at = laws.entries.iter().position(|e| same(&e.candidate, candidate))?;
-            Some((at, candidate.clone()))
-        };
-        let places: Option<Vec<(usize, Candidate)>> = chosen.choice.set.iter().map(|&c| place(c)).collect();
-        let (Some(changes), Some((rotor, _))) = (places, place(turned.place)) else { return Ok(None) };
-        laws.replace(self.model, &self.signals, &self.band, &self.still, &changes);
-        let mut set: Vec<usize> = changes.iter().map(|(at, _)| *at).collect();
-        set.sort_unstable();
-        set.dedup();
-        let turned = Some(Turned { place: rotor, ..turned.clone() });
-        self.converge(laws, set, chosen.noise.clone(), turned, progress).map(Some)
-    }
-
     /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first, of those in doubt.
     fn constant(&self, mut chosen: Chosen, doubt: impl Fn(&Candidate) -> bool) -> Result<Chosen, EffectError> {
         let doubtful = |chosen: &Chosen, c: usize| doubt(&chosen.exact.entries[c].candidate);
@@ -401,7 +252,7 @@ impl Logs<'_> {
     }
 
     /// From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
-    fn converge(
+    pub(crate) fn converge(
         &self,
         mut all: Problem,
         set: Vec<usize>,
@@ -453,7 +304,7 @@ impl Logs<'_> {
 }
 
 /// Kinds by what all of which leave rows are weighed. A push is known by when it comes: it is no outlier.
-fn weighing() -> Vec<Kind> {
+pub(crate) fn weighing() -> Vec<Kind> {
     [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact]].concat()
 }
 

@@ -4,7 +4,7 @@ use gapscope_datasets::{Recipe, generate};
 use gapscope_diagnosis::schema::{Parameter, Quantity, Verdict};
 use gapscope_dynamics::Data;
 use gapscope_effects::{Armature, Backlash, Effect, JointElasticity};
-use gapscope_tests::{diagnose, robot};
+use gapscope_tests::{diagnose, robot, simulate};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
@@ -73,4 +73,31 @@ fn play_behind_an_encoder_on_the_motor() {
 #[test]
 fn wide_play_before_a_light_rotor() {
     named(Some(0.05), 0.5, false);
+}
+
+/// Above the resonance of rotor and link, a spring's account of the torque multiplies the noise of the encoder: seen as they
+/// are, this spring leaves as much as a rigid drive.
+#[test]
+fn a_spring_that_noise_drowns() {
+    let model = robot("arm6");
+    let inertia = |j: usize| {
+        let n = model.dof();
+        let mut mass = DMatrix::zeros(n, n);
+        model.mass_matrix(&mut Data::new(&model), &vec![0.3; n], &mut mass);
+        mass[(j, j)]
+    };
+    let rotors = model.joints().iter().enumerate().map(|(j, joint)| (joint.name.clone(), 0.8 * inertia(j))).collect();
+    let stiffness = inertia(1) * (4.0 * std::f64::consts::TAU).powi(2);
+    let on = |value: f64| -> BTreeMap<String, f64> { [("joint2".to_owned(), value)].into() };
+    let spring = JointElasticity { stiffness: on(stiffness), damping: on(0.1 * (stiffness * inertia(1)).sqrt()) };
+    let effects = [Effect::Armature(Armature { armature: rotors }), Effect::JointElasticity(spring)];
+    let logs: Vec<_> = (1..4).map(|seed| simulate(&model, &effects, seed, 8.0, 250.0, 2e-5)).collect();
+    let diagnosis = diagnose(&model, &logs).diagnosis;
+    let told = format!("{:?} {:#?}", diagnosis.verdict, diagnosis.effects);
+    assert_eq!(diagnosis.verdict, Verdict::Explained, "{told}");
+    let kinds: Vec<&str> = diagnosis.effects.iter().map(|e| e.kind.as_str()).collect();
+    assert_eq!(kinds, ["armature", "joint_elasticity"], "{told}");
+    let Some(Parameter::PerJoint(map)) = diagnosis.effects[1].parameters.get("stiffness") else { panic!("{told}") };
+    let Quantity::Scalar(value) = map["joint2"].value else { panic!("{told}") };
+    assert!((value / stiffness - 1.0).abs() < 0.2, "{told}");
 }

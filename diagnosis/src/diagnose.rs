@@ -422,6 +422,7 @@ impl Logs<'_> {
         let (next_experiment, trajectory) =
             experiment::next_experiment(&self.data(&chosen.noise), &chosen.all, &chosen.choice, rivals, &found)?
                 .unzip();
+        let drives = self.least_drives(problem, fit, side, &chosen.noise)?;
         let diagnosis = Diagnosis {
             schema: DIAGNOSIS_SCHEMA.to_owned(),
             robot: model.name().to_owned(),
@@ -430,7 +431,7 @@ impl Logs<'_> {
             verdict,
             gap: gap_of(&before),
             next_experiment,
-            power: power::power(model, &chosen.all, &chosen.choice.set),
+            power: power::power(model, &chosen.all, &chosen.choice.set, &drives),
             effects: found,
             alternatives: alternatives(&chosen.all, rivals),
             unexplained: Unexplained {

@@ -8,8 +8,10 @@
 //! looked for through a filter as well, see [`Through`].
 
 mod choice;
+mod least;
 
 pub(crate) use choice::STANDS_IN;
+pub(crate) use least::Least;
 
 use crate::band::Row;
 use crate::corrected::{aligned, plant_pushed};

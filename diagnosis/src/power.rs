@@ -5,11 +5,12 @@
 //! pays its cost of complexity, lies beyond the standard errors that pruning asks for, and moves some joint by as much
 //! torque as anything must that is to be named.
 
+use crate::drive::Least;
 use crate::problem::Problem;
 use crate::schema::Power;
 use crate::select;
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::{Candidate, Kind};
+use gapscope_effects::{Candidate, Effect, Kind};
 use nalgebra::{DMatrix, DVector};
 
 /// Part of a column's size below which what the set leaves of it is rounding.
@@ -25,8 +26,8 @@ struct Gauge {
 }
 
 /// The least size of every effect at every joint; kinds in the order of the catalogue. The knob of an effect that has one,
-/// where it is not the size itself, is that in the middle of its grid.
-pub fn power(model: &Model, problem: &Problem, set: &[usize]) -> Vec<Power> {
+/// where it is not the size itself, is that in the middle of its grid. Those of springs and play in the `drives` are known.
+pub fn power(model: &Model, problem: &Problem, set: &[usize], drives: &[Least]) -> Vec<Power> {
     let mut places: Vec<(usize, &[usize])> = Vec::new();
     for entry in &problem.entries {
         if let Some(order) = Kind::ALL.iter().position(|kind| *kind == entry.candidate.kind) {
@@ -35,7 +36,33 @@ pub fn power(model: &Model, problem: &Problem, set: &[usize]) -> Vec<Power> {
     }
     places.sort();
     places.dedup();
-    places.into_iter().flat_map(|(order, joints)| sizes(model, problem, set, Kind::ALL[order], joints)).collect()
+    let linear = places.into_iter().flat_map(|(order, joints)| sizes(model, problem, set, Kind::ALL[order], joints));
+    let mut power: Vec<Power> = linear.chain(drives.iter().map(|least| of_drive(model, least))).collect();
+    power.sort_by_key(|power| Kind::ALL.iter().position(|kind| kind.name() == power.kind));
+    power
+}
+
+/// The least spring or play in a drive.
+fn of_drive(model: &Model, Least { kind, joint, drive }: &Least) -> Power {
+    let joints = [*joint];
+    let (parameter, units) = match kind {
+        Kind::JointElasticity => ("stiffness", ["N m/rad", "N/m"]),
+        _ => ("gap", ["rad", "m"]),
+    };
+    let value =
+        |effect: Effect| effect.law().parameters().into_iter().find(|v| v.name == parameter)?.value.first().copied();
+    let size = drive.as_ref().and_then(|(drive, rotor)| drive.effects(model, &[*rotor]).into_iter().find_map(value));
+    named(model, *kind, &joints, parameter, size, unit(model, &joints, units))
+}
+
+fn named(model: &Model, kind: Kind, joints: &[usize], parameter: &str, size: Option<f64>, unit: &str) -> Power {
+    Power {
+        kind: kind.name().to_owned(),
+        joints: joints.iter().map(|&j| model.joints()[j].name.clone()).collect(),
+        parameter: parameter.to_owned(),
+        size: size.filter(|size| size.is_finite()),
+        unit: unit.to_owned(),
+    }
 }
 
 /// The least sizes of one kind at one place.
@@ -45,13 +72,7 @@ fn sizes(model: &Model, problem: &Problem, set: &[usize], kind: Kind, joints: &[
         .collect();
     here.sort_by(|&a, &b| problem.entries[a].candidate.shape.total_cmp(&problem.entries[b].candidate.shape));
     let Some(&first) = here.first() else { return Vec::new() };
-    let named = |parameter: &str, size: Option<f64>, unit: &str| Power {
-        kind: kind.name().to_owned(),
-        joints: joints.iter().map(|&j| model.joints()[j].name.clone()).collect(),
-        parameter: parameter.to_owned(),
-        size: size.filter(|size| size.is_finite()),
-        unit: unit.to_owned(),
-    };
+    let named = |parameter, size, unit| named(model, kind, joints, parameter, size, unit);
     if kind == Kind::TorqueSaturation {
         // The knob is the size: the greatest limit of the grid that cuts enough away.
         let seen = |&&c: &&usize| least(problem, set, c, &[1.0], false).is_some_and(|least| least <= 1.0);
@@ -111,7 +132,7 @@ fn gauges(model: &Model, candidate: &Candidate) -> Vec<Gauge> {
         Kind::ActuationDelay => along("delay", &[1.0]),
         Kind::ActuatorLag => along("time_constant", &[1.0]),
         Kind::GravityMisalignment => return vec![along("roll", &[0.0, 1.0]), along("pitch", &[1.0, 0.0])],
-        // When something pushes is not known before; a limit is no coefficient; spring and play have no column.
+        // When something pushes is not known before; a limit is no coefficient.
         _ => return Vec::new(),
     };
     vec![one]

@@ -53,7 +53,8 @@ pub struct Power {
     /// The parameter whose size it is, by its public name.
     pub parameter: String,
     /// Its least size, of either sign; of `gain` the least distance from one; of the `stiffness` of an elastic drive and the
-    /// `limit` of a saturation the greatest value. `None` where these logs show no size of it.
+    /// `limit` of a saturation the greatest value. `None` where these logs show no size of it: springs and play in a drive
+    /// show by what the rotor behind them does, none without one.
     pub size: Option<f64>,
     /// Unit.
     pub unit: String,

@@ -49,6 +49,21 @@ impl Coupling {
         Coupling { stiffness: inertia * omega * omega, damping: 2.0 * ratio * inertia * omega, half_gap: 0.0 }
     }
 
+    /// That of a candidate at its knob: elasticity or play; nothing for other kinds.
+    fn of(drive: &Candidate) -> Option<Coupling> {
+        let (frequency, ratio) = CONTACT;
+        match drive.kind {
+            Kind::JointElasticity => {
+                Some(Coupling::resonant(drive.inertia, drive.shape, crate::joint_elasticity::RATIO))
+            }
+            Kind::Backlash => {
+                let contact = Coupling::resonant(drive.inertia, frequency, ratio);
+                Some(Coupling { half_gap: 0.5 * drive.shape, ..contact })
+            }
+            _ => None,
+        }
+    }
+
     /// The angle that a torque is seen to hold, after an angle that was expected: play lies anywhere in its gap while hardly
     /// any torque passes.
     fn held_by(&self, torque: f64, expected: f64) -> f64 {
@@ -255,13 +270,8 @@ impl JointRun {
         let taken = |k: usize| self.delivered[k] - self.rest[k];
         let all = 0..self.rest.len();
         let (motor, link): (Vec<f64>, Vec<f64>) = all.clone().map(|k| (turning(k), taken(k))).unzip();
-        let (frequency, ratio) = CONTACT;
-        let coupling = match drive.kind {
-            Kind::JointElasticity => Coupling::resonant(drive.inertia, drive.shape, crate::joint_elasticity::RATIO),
-            Kind::Backlash => {
-                Coupling { half_gap: 0.5 * drive.shape, ..Coupling::resonant(drive.inertia, frequency, ratio) }
-            }
-            _ => return motor.iter().zip(&link).map(|(motor, link)| motor - link).collect(),
+        let Some(coupling) = Coupling::of(drive) else {
+            return motor.iter().zip(&link).map(|(motor, link)| motor - link).collect();
         };
         match drive.side {
             EncoderSide::Motor => {
@@ -277,6 +287,26 @@ impl JointRun {
                 all.map(|k| motor[k] - rotor * ahead.acceleration[k] - link[k]).collect()
             }
         }
+    }
+
+    /// What a rigid drive would leave, N m (N), had the joint had the elasticity or play of a candidate, with a rotor of
+    /// some inertia, kg m² (kg), where this run had a rigid one: no account of this run, but a simulation of rotor and link
+    /// on the coupling under the torque that the link took.
+    ///
+    /// J θ̈ = u − T, I q̈ = T − h; where a rigid drive had to pass on T*, δ̈ = (T* − T(δ, δ̇)) (1/J + 1/I). With the motion of
+    /// the link logged, a rigid drive leaves J δ̈, with that of the motor I δ̈.
+    pub fn hidden_by(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
+        let Some(coupling) = Coupling::of(drive) else { return vec![0.0; self.rest.len()] };
+        let taken: Vec<f64> = self.delivered.iter().zip(&self.rest).map(|(effort, rest)| effort - rest).collect();
+        let both: Vec<f64> = self.inertia.iter().map(|link| link * rotor / (link + rotor)).collect();
+        let free = Oscillator { drive: &taken, inertia: &both, slope: None, coupling, dt: self.dt };
+        let of = |k: usize| match drive.side {
+            EncoderSide::Motor => self.inertia[k],
+            EncoderSide::Link => rotor,
+        };
+        // Of the angle, as what drives a spring that hardly moves is a small difference of large torques.
+        let acceleration = second_derivative(&free.wind_up(None).angle, self.dt);
+        acceleration.iter().enumerate().map(|(k, acceleration)| of(k) * acceleration).collect()
     }
 }
 
@@ -365,6 +395,50 @@ mod tests {
         // One that rests under its load stays as it is.
         let resting = motor.torque_from(at_rest);
         assert_eq!(motor.start(&resting, at_rest), Some(at_rest));
+    }
+
+    /// A rigid drive with a rotor of 0.3 kg m² behind a link of 0.2 kg m² that takes `torque` of time, 10 s at 1 kHz.
+    fn rigid_run(torque: impl Fn(f64) -> f64) -> JointRun {
+        let samples = 10_000;
+        let taken: Vec<f64> = (0..samples).map(|k| torque(k as f64 * 1e-3)).collect();
+        JointRun {
+            delivered: taken,
+            rest: vec![0.0; samples],
+            acceleration: vec![0.0; samples],
+            inertia: vec![0.2; samples],
+            slope: vec![0.0; samples],
+            dt: 1e-3,
+        }
+    }
+
+    #[test]
+    fn a_slow_torque_winds_a_spring_by_torque_over_stiffness() {
+        let omega = TAU * 0.5;
+        let run = rigid_run(|t| 2.0 * (omega * t).cos());
+        let on = |side| Candidate { shape: 8.0, inertia: 0.2, side, ..Candidate::new(Kind::JointElasticity, vec![0]) };
+        let stiffness = 0.2 * (TAU * 8.0).powi(2);
+        for (side, turns) in [(EncoderSide::Link, 0.3), (EncoderSide::Motor, 0.2)] {
+            let hidden = run.hidden_by(&on(side), 0.3);
+            let greatest = turns * omega * omega * 2.0 / stiffness;
+            // What it began with has died away.
+            for k in 4000..10_000 {
+                let expected = -greatest * (omega * k as f64 * 1e-3).cos();
+                assert!((hidden[k] - expected).abs() < 0.03 * greatest, "{side:?} {k}: {} {expected}", hidden[k]);
+            }
+        }
+        assert!(run.hidden_by(&Candidate::new(Kind::Armature, vec![0]), 0.3).iter().all(|x| *x == 0.0));
+    }
+
+    #[test]
+    fn play_does_nothing_but_where_its_load_changes_sign() {
+        let play = |gap| Candidate { shape: gap, inertia: 0.2, ..Candidate::new(Kind::Backlash, vec![0]) };
+        // What the gap does beyond the spring of its contact, once that has come to rest.
+        let most = |run: &JointRun| -> f64 {
+            let [open, closed] = [0.01, 0.0].map(|gap| run.hidden_by(&play(gap), 0.3));
+            (4000..10_000).map(|k| (open[k] - closed[k]).abs()).fold(0.0, f64::max)
+        };
+        assert!(most(&rigid_run(|t| 2.0 + (TAU * 0.5 * t).cos())) < 1e-9);
+        assert!(most(&rigid_run(|t| 2.0 * (TAU * 0.5 * t).cos())) > 0.1);
     }
 
     #[test]

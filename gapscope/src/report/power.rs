@@ -42,7 +42,8 @@ pub fn render(diagnosis: &Diagnosis) -> Markup {
         }
         p.note {
             "Beside the effects found, at the selection’s own bar; – where no size shows. A coupling stands at its second joint, "
-            "a load at the joint that carries it, as a point at the link’s centre of mass."
+            "a load at the joint that carries it, as a point at the link’s centre of mass. Springs and play in a drive show by "
+            "what the rotor behind them does: – where none was found."
         }
     }
 }

@@ -1,10 +1,13 @@
 //! The least sizes that a diagnosis says its logs would have revealed: what is well above is found, what is well below is not.
 
 use gapscope_datasets::Episode;
-use gapscope_diagnosis::schema::{Power, Verdict};
-use gapscope_dynamics::Model;
-use gapscope_effects::{Armature, CoulombFriction, Effect, Payload, TorqueBias, TorqueGainError, ViscousFriction};
+use gapscope_diagnosis::schema::{Diagnosis, Power, Verdict};
+use gapscope_dynamics::{Data, Model};
+use gapscope_effects::{
+    Armature, Backlash, CoulombFriction, Effect, JointElasticity, Payload, TorqueBias, TorqueGainError, ViscousFriction,
+};
 use gapscope_tests::{diagnose, robot, simulate};
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
 fn logs(model: &Model, effects: &[Effect]) -> Vec<Episode> {
@@ -26,6 +29,11 @@ fn effect(model: &Model, power: &Power, size: f64) -> Effect {
             let com = body.center_of_mass().unwrap().to_array();
             Effect::Payload(Payload { joint, mass: size, com, inertia: [0.0; 6] })
         }
+        "joint_elasticity" => {
+            let damping = [(joint.clone(), 0.1 * (size * inertia(model, &joint)).sqrt())].into();
+            Effect::JointElasticity(JointElasticity { stiffness: one, damping })
+        }
+        "backlash" => Effect::Backlash(Backlash { gap: one }),
         other => panic!("{other}"),
     }
 }
@@ -63,4 +71,57 @@ fn sizes_are_those_that_are_found() {
     let first = |kind: &str| nothing.power.iter().find(|p| p.kind == kind && p.joints == ["joint1"]).unwrap().size;
     assert_eq!(first("joint_zero_offset"), None);
     assert!(first("coulomb_friction").is_some());
+}
+
+/// Springs and play act by what the rotor behind them does: here each joint has one.
+#[test]
+fn so_are_those_of_springs_and_play() {
+    let model = robot("arm6");
+    let rotors = rotors(&model);
+    // Encoders of 17 bits or so: the least play is then one that gears have.
+    let logs = |effects: &[Effect]| -> Vec<Episode> {
+        (1..4).map(|seed| simulate(&model, effects, seed, 8.0, 250.0, 2e-5)).collect()
+    };
+    let nothing = diagnose(&model, &logs(&[rotors.clone()])).diagnosis;
+    let kinds = |d: &Diagnosis| d.effects.iter().map(|e| e.kind.clone()).collect::<Vec<_>>();
+    assert_eq!(kinds(&nothing), ["armature"]);
+    let mut wrong = Vec::new();
+    for (kind, joint) in [
+        ("joint_elasticity", "joint2"),
+        ("joint_elasticity", "joint5"),
+        ("backlash", "joint3"),
+        ("backlash", "joint4"),
+        ("backlash", "joint5"),
+        ("backlash", "joint6"),
+    ] {
+        let power = nothing.power.iter().find(|p| p.kind == kind && p.joints == [joint]).unwrap();
+        let Some(size) = power.size else {
+            wrong.push(format!("{kind} at {joint} has no size"));
+            continue;
+        };
+        for (part, seen) in [(0.4, false), (5.0, true)] {
+            // The softer a spring is, the more it shows.
+            let size = if kind == "backlash" { part * size } else { size / part };
+            let found = diagnose(&model, &logs(&[rotors.clone(), effect(&model, power, size)])).diagnosis;
+            if kinds(&found).iter().any(|found| found == kind) != seen {
+                wrong.push(format!("{kind} at {joint}, {size} {}: {:?}", power.unit, kinds(&found)));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// A rotor in each joint, eight tenths of the inertia that it turns.
+fn rotors(model: &Model) -> Effect {
+    let armature = model.joints().iter().map(|joint| (joint.name.clone(), 0.8 * inertia(model, &joint.name)));
+    Effect::Armature(Armature { armature: armature.collect() })
+}
+
+/// Of the robot about a joint, kg m².
+fn inertia(model: &Model, joint: &str) -> f64 {
+    let n = model.dof();
+    let mut mass = DMatrix::zeros(n, n);
+    model.mass_matrix(&mut Data::new(model), &vec![0.3; n], &mut mass);
+    let j = model.joint_index(joint).unwrap();
+    mass[(j, j)]
 }

@@ -1,0 +1,144 @@
+//! The least spring or play in a drive that the logs would have revealed.
+//!
+//! Neither has a column, so rotor and link are simulated on each under the torque that the link took, with the rotor that
+//! was found: what that makes of the torque beyond noise and another rotor is what a rigid drive would have left, and is
+//! held against the bar of the search itself.
+
+use super::choice::{BETTER, HALF, IN_NOISE, OF_JOINT};
+use super::{FILTERED, NOTHING, Rigid, SOFTEST, STIFFEST, Study, beyond_doubt, dot, mean, smooth, tells};
+use crate::diagnose::Logs;
+use crate::estimate::Fit;
+use crate::gap;
+use crate::problem::Problem;
+use crate::verdict::Level;
+use gapscope_effects::{Candidate, EffectError, EncoderSide, JointRun, Kind};
+use rayon::prelude::*;
+
+/// Gaps that are tried, rad or m, from the least on.
+const GAP: (f64, f64) = (1e-4, 0.3);
+/// From one knob to the next, relative.
+const STEP: f64 = 1.15;
+
+/// The least spring or play of one joint.
+#[derive(Debug, Clone)]
+pub(crate) struct Least {
+    /// Spring or play.
+    pub kind: Kind,
+    /// Where it is.
+    pub joint: usize,
+    /// The stiffest spring or the narrowest gap that would have shown, and the rotor that it was tried with, kg m² (kg).
+    pub drive: Option<(Candidate, f64)>,
+}
+
+impl Logs<'_> {
+    /// The least spring and play of every joint beside a fit's other effects, encoders on one side; `noise` is the noise
+    /// floor of each joint, N m or N.
+    pub(crate) fn least_drives(
+        &self,
+        problem: &Problem,
+        fit: &Fit,
+        side: EncoderSide,
+        noise: &[f64],
+    ) -> Result<Vec<Least>, EffectError> {
+        let rigid = |c: &usize| {
+            let candidate = &problem.entries[*c].candidate;
+            candidate.kind != Kind::Armature && !candidate.turns()
+        };
+        let others = Fit { set: fit.set.iter().copied().filter(rigid).collect(), ..fit.clone() };
+        let runs = self.joint_runs(problem, &others)?;
+        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
+        let of_joint = |j: usize| {
+            let mut study = self.moving[j].then(|| Study::new(self, &runs, j, false));
+            let mut least = |kind, through| {
+                let study = study.as_mut()?;
+                study.through = through;
+                study.least(kind, side, weights[j], noise[j])
+            };
+            let play = least(Kind::Backlash, false);
+            // As they are, and through a filter: the stiffer of the two is the less.
+            let springs = [false, true].map(|through| least(Kind::JointElasticity, through));
+            let spring = springs.into_iter().flatten().max_by(|a, b| a.0.shape.total_cmp(&b.0.shape));
+            [(Kind::JointElasticity, spring), (Kind::Backlash, play)].map(|(kind, drive)| Least {
+                kind,
+                joint: j,
+                drive,
+            })
+        };
+        Ok((0..self.model.dof()).into_par_iter().flat_map_iter(of_joint).collect())
+    }
+}
+
+impl Study<'_> {
+    /// The first of ever softer springs, or ever wider gaps, that the search would have told from a rigid drive; nothing
+    /// where no rotor shows, without which neither does anything to the torque.
+    fn least(&self, kind: Kind, side: EncoderSide, weight: f64, floor: f64) -> Option<(Candidate, f64)> {
+        let rotor = self.rotor;
+        if !self.shows(rotor) || (self.through && (kind, side) != FILTERED) {
+            return None;
+        }
+        let (first, last, by) = match kind {
+            Kind::JointElasticity => (STIFFEST, SOFTEST, 1.0 / STEP),
+            _ => (GAP.0, GAP.1, STEP),
+        };
+        let knobs =
+            (0..).map(|i| first * by.powi(i)).take_while(|knob| if by > 1.0 { *knob <= last } else { *knob >= last });
+        let at = |shape| Candidate { shape, side, inertia: self.inertia, ..Candidate::new(kind, vec![self.joint]) };
+        let found = knobs.map(at).find(|drive| self.would_show(drive, rotor, weight, floor));
+        found.map(|drive| (drive, rotor))
+    }
+
+    /// Whether the search would have told a drive from a rigid one.
+    fn would_show(&self, drive: &Candidate, rotor: f64, weight: f64, floor: f64) -> bool {
+        let rigid = self.against(drive, rotor);
+        let hidden = self.hidden(drive, rotor, &rigid);
+        let with = vec![rigid.nothing; hidden.len()];
+        let without =
+            Rigid { left: hidden.iter().map(|hidden| hidden + rigid.nothing).collect(), ..rigid.into_owned() };
+        if !tells(&without, &without.left) {
+            return false;
+        }
+        let Some(beyond) = beyond_doubt(&without, &with) else { return false };
+        let floor = floor * (mean(&without.noise) / mean(&self.rigid.noise).max(f64::MIN_POSITIVE)).sqrt();
+        let level = |hidden: f64| weight * hidden.sqrt().hypot(floor);
+        let typical = |hidden: &[f64]| {
+            mean(&hidden.iter().map(|hidden| level(*hidden).hypot(NOTHING).ln()).collect::<Vec<_>>()).exp()
+        };
+        let (rest, floor) = (level(mean(&hidden)), level(0.0));
+        let (without, with) = (typical(&hidden), typical(&vec![0.0; hidden.len()]));
+        let more_than_noise = Level { before: rest, after: rest, floor }.leaves_any();
+        match (more_than_noise, self.through) {
+            (true, false) => with < BETTER * without,
+            (true, true) => floor < HALF * rest,
+            (false, false) => beyond >= IN_NOISE && with < OF_JOINT * without,
+            (false, true) => false,
+        }
+    }
+
+    /// Mean square of each block that a rigid drive with the best rotor would leave of a drive, beyond noise, (N m)².
+    fn hidden(&self, drive: &Candidate, rotor: f64, rigid: &Rigid) -> Vec<f64> {
+        let cutoff = self.view(drive, rotor).smooth;
+        let difference = |runs: &[&JointRun]| -> Vec<f64> {
+            let rows = |torque: &dyn Fn(&JointRun) -> Vec<f64>| -> Vec<f64> {
+                let filtered =
+                    |(e, run): (usize, &&JointRun)| self.logs.band.filter(e, &smooth(torque(run), cutoff, run.dt));
+                runs.iter().enumerate().flat_map(filtered).collect()
+            };
+            let mut own = rows(&|run| run.hidden_by(drive, rotor));
+            if drive.kind == Kind::Backlash {
+                // Its contact is a spring, with or without a gap.
+                let closed = Candidate { shape: 0.0, ..drive.clone() };
+                let contact = rows(&|run| run.hidden_by(&closed, rotor));
+                own.iter_mut().zip(contact).for_each(|(own, contact)| *own -= contact);
+            }
+            let heavier = rows(&|run| run.acceleration.clone());
+            let part = dot(&own, &heavier) / dot(&heavier, &heavier).max(f64::MIN_POSITIVE);
+            own.iter().zip(&heavier).map(|(own, heavier)| own - part * heavier).collect()
+        };
+        let own = difference(&self.runs);
+        let noisier = difference(&self.noisier.iter().collect::<Vec<_>>());
+        let noise = self.mean_squares(noisier.iter().zip(&own).map(|(noisier, own)| noisier - own).collect());
+        // Play is so sensitive that noise might account for all of it.
+        let beyond = |((own, noise), rigid): ((&f64, &f64), &f64)| (own - noise.min(*rigid)).max(0.0);
+        self.mean_squares(own).iter().zip(&noise).zip(&rigid.noise).map(beyond).collect()
+    }
+}

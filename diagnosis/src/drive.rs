@@ -214,7 +214,7 @@ impl<'a> Study<'a> {
     }
 
     fn best(&self) -> Option<Account> {
-        if !tells(&self.rigid, &self.rigid.left) {
+        if self.inertia <= 0.0 || !tells(&self.rigid, &self.rigid.left) {
             return None;
         }
         let rest =
@@ -269,9 +269,10 @@ impl<'a> Study<'a> {
         possible.then_some(Account { drive: Candidate { knob_error, ..drive }, beyond, through })
     }
 
-    /// Whether a rotor is heavy enough for its drive to show.
+    /// Whether a rotor is heavy enough for its drive to show. A link without inertia about its joint has no drive that turns
+    /// on its own: some URDFs have such last links.
     fn shows(&self, rotor: f64) -> bool {
-        rotor > 1.1 * LIGHTEST * self.inertia
+        self.inertia > 0.0 && rotor > 1.1 * LIGHTEST * self.inertia
     }
 
     /// The rotor with which a rigid drive leaves least, by least squares.

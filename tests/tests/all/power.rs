@@ -82,7 +82,7 @@ fn so_are_those_of_springs_and_play() {
     let logs = |effects: &[Effect]| -> Vec<Episode> {
         (1..4).map(|seed| simulate(&model, effects, seed, 8.0, 250.0, 2e-5)).collect()
     };
-    let nothing = diagnose(&model, &logs(&[rotors.clone()])).diagnosis;
+    let nothing = diagnose(&model, &logs(std::slice::from_ref(&rotors))).diagnosis;
     let kinds = |d: &Diagnosis| d.effects.iter().map(|e| e.kind.clone()).collect::<Vec<_>>();
     assert_eq!(kinds(&nothing), ["armature"]);
     let mut wrong = Vec::new();

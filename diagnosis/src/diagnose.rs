@@ -150,8 +150,8 @@ pub(crate) struct Logs<'a> {
 }
 
 /// Held-out residuals and state errors of one model.
-pub(crate) struct HeldOut {
-    pub rows: Rows,
+struct HeldOut {
+    rows: Rows,
     errors: Errors,
 }
 
@@ -198,18 +198,17 @@ impl Logs<'_> {
     }
 
     /// Residuals and state errors on each fold of the model fitted without that fold.
-    pub(crate) fn held_out(&self, problem: &Problem, set: &[usize], with_errors: bool) -> Result<HeldOut, EffectError> {
+    fn held_out(&self, problem: &Problem, set: &[usize]) -> Result<HeldOut, EffectError> {
+        let rows = self.held_out_rows(problem, set, None)?;
         let fits = Fit::without_folds(problem, set);
         let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
         let side = problem.side(set);
-        let n = self.model.dof();
-        let rows = self.held_out_through(problem, set, None)?;
-        let mut steps = with_errors;
+        let mut steps = true;
         for effects in &effects {
             steps &= horizon::can_step(&Plant::new(self.model, effects, 1e-3)?, &self.signals);
         }
         let errors = if steps {
-            horizon::errors(&self.signals, &self.band, n, |dt, fold| {
+            horizon::errors(&self.signals, &self.band, self.model.dof(), |dt, fold| {
                 plant(self.model, &effects[fold], side, dt).unwrap_or_else(|_| Plant::nominal(self.model, dt))
             })
         } else {
@@ -219,12 +218,7 @@ impl Logs<'_> {
     }
 
     /// The residuals alone, that of one joint through a filter where there is one.
-    pub(crate) fn held_out_through(
-        &self,
-        problem: &Problem,
-        set: &[usize],
-        through: Option<Through>,
-    ) -> Result<Rows, EffectError> {
+    fn held_out_rows(&self, problem: &Problem, set: &[usize], through: Option<Through>) -> Result<Rows, EffectError> {
         let fits = Fit::without_folds(problem, set);
         let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
         let side = problem.side(set);
@@ -266,18 +260,22 @@ impl Logs<'_> {
 
     /// The same as sums of squares a joint, (N m)² or N², and the count of rows.
     pub(crate) fn left_by_joint(&self, problem: &Problem, set: &[usize]) -> Result<Vec<f64>, EffectError> {
-        let rows = self.beside_outside(problem, set, &self.held_out(problem, set, false)?.rows, None);
-        Ok(gap::total(&gap::squares(&self.band, &rows, |_| true)))
+        Ok(gap::total(&self.left_by_block(problem, set, None)?))
     }
 
-    /// Held-out residuals of a set less what laws outside the catalogue in it account for.
-    pub(crate) fn beside_outside(
+    /// The same block by block, one joint through a filter where there is one.
+    pub(crate) fn left_by_block(
         &self,
         problem: &Problem,
         set: &[usize],
-        rows: &Rows,
         through: Option<Through>,
-    ) -> Rows {
+    ) -> Result<Vec<Vec<f64>>, EffectError> {
+        let rows = self.beside_outside(problem, set, &self.held_out_rows(problem, set, through)?, through);
+        Ok(gap::squares(&self.band, &rows, |_| true))
+    }
+
+    /// Held-out residuals of a set less what laws outside the catalogue in it account for.
+    fn beside_outside(&self, problem: &Problem, set: &[usize], rows: &Rows, through: Option<Through>) -> Rows {
         let mut rows = rows.clone();
         let outside = problem.outside(set);
         if outside.is_empty() {
@@ -351,7 +349,7 @@ impl Logs<'_> {
         let side = problem.side(&fit.set);
         progress("held-out rollouts", 0.7);
         let before = self.nominal();
-        let after = self.held_out(problem, &fit.set, true)?;
+        let after = self.held_out(problem, &fit.set)?;
         let final_residuals = self.data(&chosen.noise).rest(problem, fit)?;
         let floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof(), floor::lag(&effects));
         progress("intervals", 0.85);
@@ -468,7 +466,7 @@ impl Logs<'_> {
         let mut found = Vec::new();
         for (effect, own) in fit.effects_with_candidates(problem, self.model) {
             let kind = effect.kind();
-            let alone = change(&self.held_out(problem, &own, false)?.rows);
+            let alone = change(&self.held_out_rows(problem, &own, None)?);
             let turned = chosen.turned.as_ref().filter(|t| t.drive.kind == kind);
             // The choice sees a drive by its rotor.
             let seen_as = if turned.is_some() { Kind::Armature } else { kind };

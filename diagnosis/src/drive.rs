@@ -214,7 +214,7 @@ impl<'a> Study<'a> {
     }
 
     fn best(&self) -> Option<Account> {
-        if self.inertia <= 0.0 || !tells(&self.rigid, &self.rigid.left) {
+        if !tells(&self.rigid, &self.rigid.left) {
             return None;
         }
         let rest =
@@ -323,11 +323,16 @@ impl<'a> Study<'a> {
 
     /// What a drive leaves at the rows of the band; nothing of the episodes that are not looked at.
     fn rows(&self, runs: &[impl Borrow<JointRun>], drive: &Candidate, rotor: f64, view: View) -> Vec<f64> {
+        self.rows_of(runs, view, |run| run.left_by(drive, rotor))
+    }
+
+    /// A torque of each run at the rows of the band, in a view.
+    fn rows_of(&self, runs: &[impl Borrow<JointRun>], view: View, torque: impl Fn(&JointRun) -> Vec<f64>) -> Vec<f64> {
         let mut rows = vec![0.0; self.logs.band.rows.len()];
         for (e, run) in runs.iter().enumerate().filter(|(e, _)| view.episode.is_none_or(|only| only == *e)) {
             let run: &JointRun = run.borrow();
-            let rest = smooth(run.left_by(drive, rotor), view.smooth, run.dt);
-            rows[self.logs.band.of_episode[e].clone()].copy_from_slice(&self.logs.band.filter(e, &rest));
+            let seen = smooth(torque(run), view.smooth, run.dt);
+            rows[self.logs.band.of_episode[e].clone()].copy_from_slice(&self.logs.band.filter(e, &seen));
         }
         rows
     }

@@ -42,6 +42,7 @@ const UNNOTICED: f64 = 2e-3;
 const ALL_BUT: f64 = 1e-3;
 /// What a kind more must take away, relative, where two sets with a drive are compared.
 pub(crate) const A_KIND: f64 = 0.02;
+
 /// What the search came to.
 pub(crate) struct Chosen {
     /// Every candidate, around the parameters found.

@@ -3,8 +3,9 @@
 
 use gapscope_datasets::{ColumnMap, Episode, ReadOptions, Recipe, Sensors, generate, read_logs};
 use gapscope_diagnosis::Outcome;
-use gapscope_dynamics::{Model, robots};
-use gapscope_effects::Effect;
+use gapscope_dynamics::{Data, Model, robots};
+use gapscope_effects::{Armature, Effect};
+use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
 
 /// The built-in robot of this name.
@@ -31,6 +32,24 @@ pub fn simulate(model: &Model, effects: &[Effect], seed: u64, seconds: f64, rate
 /// Where the diagnosis fails: no log may make it.
 pub fn diagnose(model: &Model, episodes: &[Episode]) -> Outcome {
     gapscope_diagnosis::diagnose(model, episodes, Vec::new(), &|_, _| {}).expect("a diagnosis of any log")
+}
+
+/// Inertia of the robot about a joint, the others locked, 0.3 rad (m) from zero, kg m² (kg).
+///
+/// # Panics
+/// Where the robot has no joint of this name.
+pub fn inertia_about(model: &Model, joint: &str) -> f64 {
+    let n = model.dof();
+    let mut mass = DMatrix::zeros(n, n);
+    model.mass_matrix(&mut Data::new(model), &vec![0.3; n], &mut mass);
+    let j = model.joint_index(joint).expect("a joint of the robot");
+    mass[(j, j)]
+}
+
+/// A rotor in each joint, eight tenths of the inertia that it turns.
+pub fn rotors(model: &Model) -> Effect {
+    let armature = model.joints().iter().map(|joint| (joint.name.clone(), 0.8 * inertia_about(model, &joint.name)));
+    Effect::Armature(Armature { armature: armature.collect() })
 }
 
 /// The folder that an environment variable names, or its default beside the workspace; says so where it is missing.

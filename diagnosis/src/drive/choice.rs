@@ -112,11 +112,9 @@ impl<'a> Bar<'a> {
     }
 }
 
-/// What a choice leaves on held-out data, block by block, beside what laws outside the catalogue in it account for.
+/// What a choice leaves on held-out data, block by block.
 fn left_by(logs: &Logs<'_>, chosen: &Chosen, through: Option<Through>) -> Result<Vec<Vec<f64>>, EffectError> {
-    let rows = logs.held_out_through(&chosen.exact, &chosen.fit.set, through)?;
-    let rows = logs.beside_outside(&chosen.exact, &chosen.fit.set, &rows, through);
-    Ok(gap::squares(&logs.band, &rows, |_| true))
+    logs.left_by_block(&chosen.exact, &chosen.fit.set, through)
 }
 
 impl Logs<'_> {

@@ -5,7 +5,7 @@
 //! held against the bar of the search itself.
 
 use super::choice::{BETTER, HALF, IN_NOISE, OF_JOINT};
-use super::{FILTERED, NOTHING, Rigid, SOFTEST, STIFFEST, Study, beyond_doubt, dot, mean, smooth, tells};
+use super::{FILTERED, NOTHING, Rigid, SOFTEST, STIFFEST, Study, beyond_doubt, dot, mean, tells};
 use crate::diagnose::Logs;
 use crate::estimate::Fit;
 use crate::gap;
@@ -116,21 +116,16 @@ impl Study<'_> {
 
     /// Mean square of each block that a rigid drive with the best rotor would leave of a drive, beyond noise, (N m)².
     fn hidden(&self, drive: &Candidate, rotor: f64, rigid: &Rigid) -> Vec<f64> {
-        let cutoff = self.view(drive, rotor).smooth;
+        let view = self.view(drive, rotor);
         let difference = |runs: &[&JointRun]| -> Vec<f64> {
-            let rows = |torque: &dyn Fn(&JointRun) -> Vec<f64>| -> Vec<f64> {
-                let filtered =
-                    |(e, run): (usize, &&JointRun)| self.logs.band.filter(e, &smooth(torque(run), cutoff, run.dt));
-                runs.iter().enumerate().flat_map(filtered).collect()
-            };
-            let mut own = rows(&|run| run.hidden_by(drive, rotor));
+            let mut own = self.rows_of(runs, view, |run| run.hidden_by(drive, rotor));
             if drive.kind == Kind::Backlash {
                 // Its contact is a spring, with or without a gap.
                 let closed = Candidate { shape: 0.0, ..drive.clone() };
-                let contact = rows(&|run| run.hidden_by(&closed, rotor));
+                let contact = self.rows_of(runs, view, |run| run.hidden_by(&closed, rotor));
                 own.iter_mut().zip(contact).for_each(|(own, contact)| *own -= contact);
             }
-            let heavier = rows(&|run| run.acceleration.clone());
+            let heavier = self.rows_of(runs, view, |run| run.acceleration.clone());
             let part = dot(&own, &heavier) / dot(&heavier, &heavier).max(f64::MIN_POSITIVE);
             own.iter().zip(&heavier).map(|(own, heavier)| own - part * heavier).collect()
         };

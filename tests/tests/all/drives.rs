@@ -2,10 +2,8 @@
 
 use gapscope_datasets::{Recipe, generate};
 use gapscope_diagnosis::schema::{Parameter, Quantity, Verdict};
-use gapscope_dynamics::Data;
 use gapscope_effects::{Armature, Backlash, Effect, JointElasticity};
-use gapscope_tests::{diagnose, robot, simulate};
-use nalgebra::DMatrix;
+use gapscope_tests::{diagnose, inertia_about, robot, rotors, simulate};
 use std::collections::BTreeMap;
 
 const JOINT: usize = 2;
@@ -15,11 +13,8 @@ const RESONANCE: f64 = 5.0;
 /// What is named of a spring or play in the third joint of the six, beside a rotor as heavy as this part of the link.
 fn named(play: Option<f64>, rotor: f64, motor_encoders: bool) {
     let model = robot("arm6");
-    let n = model.dof();
-    let mut mass = DMatrix::zeros(n, n);
-    model.mass_matrix(&mut Data::new(&model), &vec![0.3; n], &mut mass);
-    let inertia = mass[(JOINT, JOINT)];
     let name = model.joints()[JOINT].name.clone();
+    let inertia = inertia_about(&model, &name);
     let on = |value: f64| -> BTreeMap<String, f64> { [(name.clone(), value)].into() };
     let stiffness = inertia * (std::f64::consts::TAU * RESONANCE).powi(2);
     let drive = match play {
@@ -80,17 +75,11 @@ fn wide_play_before_a_light_rotor() {
 #[test]
 fn a_spring_that_noise_drowns() {
     let model = robot("arm6");
-    let inertia = |j: usize| {
-        let n = model.dof();
-        let mut mass = DMatrix::zeros(n, n);
-        model.mass_matrix(&mut Data::new(&model), &vec![0.3; n], &mut mass);
-        mass[(j, j)]
-    };
-    let rotors = model.joints().iter().enumerate().map(|(j, joint)| (joint.name.clone(), 0.8 * inertia(j))).collect();
-    let stiffness = inertia(1) * (4.0 * std::f64::consts::TAU).powi(2);
+    let inertia = inertia_about(&model, "joint2");
+    let stiffness = inertia * (4.0 * std::f64::consts::TAU).powi(2);
     let on = |value: f64| -> BTreeMap<String, f64> { [("joint2".to_owned(), value)].into() };
-    let spring = JointElasticity { stiffness: on(stiffness), damping: on(0.1 * (stiffness * inertia(1)).sqrt()) };
-    let effects = [Effect::Armature(Armature { armature: rotors }), Effect::JointElasticity(spring)];
+    let spring = JointElasticity { stiffness: on(stiffness), damping: on(0.1 * (stiffness * inertia).sqrt()) };
+    let effects = [rotors(&model), Effect::JointElasticity(spring)];
     let logs: Vec<_> = (1..4).map(|seed| simulate(&model, &effects, seed, 8.0, 250.0, 2e-5)).collect();
     let diagnosis = diagnose(&model, &logs).diagnosis;
     let told = format!("{:?} {:#?}", diagnosis.verdict, diagnosis.effects);

@@ -2,12 +2,11 @@
 
 use gapscope_datasets::Episode;
 use gapscope_diagnosis::schema::{Diagnosis, Power, Verdict};
-use gapscope_dynamics::{Data, Model};
+use gapscope_dynamics::Model;
 use gapscope_effects::{
     Armature, Backlash, CoulombFriction, Effect, JointElasticity, Payload, TorqueBias, TorqueGainError, ViscousFriction,
 };
-use gapscope_tests::{diagnose, robot, simulate};
-use nalgebra::DMatrix;
+use gapscope_tests::{diagnose, inertia_about, robot, rotors, simulate};
 use std::collections::BTreeMap;
 
 fn logs(model: &Model, effects: &[Effect]) -> Vec<Episode> {
@@ -30,7 +29,7 @@ fn effect(model: &Model, power: &Power, size: f64) -> Effect {
             Effect::Payload(Payload { joint, mass: size, com, inertia: [0.0; 6] })
         }
         "joint_elasticity" => {
-            let damping = [(joint.clone(), 0.1 * (size * inertia(model, &joint)).sqrt())].into();
+            let damping = [(joint.clone(), 0.1 * (size * inertia_about(model, &joint)).sqrt())].into();
             Effect::JointElasticity(JointElasticity { stiffness: one, damping })
         }
         "backlash" => Effect::Backlash(Backlash { gap: one }),
@@ -109,19 +108,4 @@ fn so_are_those_of_springs_and_play() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
-}
-
-/// A rotor in each joint, eight tenths of the inertia that it turns.
-fn rotors(model: &Model) -> Effect {
-    let armature = model.joints().iter().map(|joint| (joint.name.clone(), 0.8 * inertia(model, &joint.name)));
-    Effect::Armature(Armature { armature: armature.collect() })
-}
-
-/// Of the robot about a joint, kg m².
-fn inertia(model: &Model, joint: &str) -> f64 {
-    let n = model.dof();
-    let mut mass = DMatrix::zeros(n, n);
-    model.mass_matrix(&mut Data::new(model), &vec![0.3; n], &mut mass);
-    let j = model.joint_index(joint).unwrap();
-    mass[(j, j)]
 }

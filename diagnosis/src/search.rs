@@ -180,27 +180,33 @@ impl Logs<'_> {
         if let Some(open) = open.filter(|open| open.left() < best.left()) {
             // Beside laws that leave nothing but noise, noise is all that could tell an effect from itself.
             let doubt = much && open.judged.leaves_any();
-            return self.constant(open.chosen, |_| doubt);
+            return self.constant(open.chosen, doubt, |_| true);
         }
         if best.kinds.is_empty() || !best.judged.spoils() {
-            return self.constant(best.chosen, |candidate| best.judged.doubts(&candidate.joints));
+            let judged = &best.judged;
+            return self.constant(best.chosen, judged.leaves_much(), |candidate| judged.doubts(&candidate.joints));
         }
         let modest = without(&REACHING)?;
         if modest.kinds.is_empty() || !modest.judged.spoils() {
-            return self.constant(modest.chosen, |candidate| modest.judged.doubts(&candidate.joints));
+            let judged = &modest.judged;
+            return self.constant(modest.chosen, judged.leaves_much(), |candidate| judged.doubts(&candidate.joints));
         }
         let choice = select::evaluate(&modest.chosen.all, Vec::new());
         let (exact, fit) = self.data(&modest.chosen.noise).refine(&[])?;
         Ok(Chosen { choice, exact, fit, ..modest.chosen })
     }
 
-    /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first, of those in doubt.
-    fn constant(&self, mut chosen: Chosen, doubt: impl Fn(&Candidate) -> bool) -> Result<Chosen, EffectError> {
-        let doubtful = |chosen: &Chosen, c: usize| doubt(&chosen.exact.entries[c].candidate);
-        while chosen.fit.set.iter().any(|&c| doubtful(&chosen, c))
-            && let Some((worst, _)) = constancy::inconsistent(&chosen.exact, &chosen.fit, &self.signals, &self.band)
-                .into_iter()
-                .find(|&(c, _)| doubtful(&chosen, c))
+    /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first, where much is left:
+    /// those in doubt by regime, all by what changes slowly and fast.
+    fn constant(
+        &self,
+        mut chosen: Chosen,
+        much: bool,
+        doubt: impl Fn(&Candidate) -> bool,
+    ) -> Result<Chosen, EffectError> {
+        while much
+            && let Some(&(worst, _)) =
+                constancy::inconsistent(&chosen.exact, &chosen.fit, &self.signals, &self.band, &doubt).first()
         {
             chosen.choice.set.remove(worst);
             let (exact, fit) =

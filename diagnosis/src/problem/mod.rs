@@ -6,6 +6,7 @@ mod terms;
 mod weigh;
 
 use crate::band::Band;
+use crate::kernel::{Kernel, apply};
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, Column, EncoderSide, Kind};
@@ -203,12 +204,12 @@ impl Problem {
         part
     }
 
-    /// The same problem twice, with the same weights: the mean of each row with as many on either side, and what the row has
-    /// beyond it. A moving average of a law's torque is the law's on the moving average of its signature.
-    pub fn slow_and_fast(&self, band: &Band, reach: usize) -> [Problem; 2] {
+    /// The same problem twice, with the same weights: each row smoothed with its neighbours, and what the row has beyond it.
+    /// A law's torque, smoothed, is the law's on its smoothed signature.
+    pub fn slow_and_fast(&self, band: &Band, kernel: &Kernel) -> [Problem; 2] {
         [true, false].map(|slow| {
             let mut part = self.clone();
-            part.joints.par_iter_mut().for_each(|joint| joint.smooth(band, reach, slow));
+            part.joints.par_iter_mut().for_each(|joint| joint.smooth(band, kernel, slow));
             part.accumulate(band);
             part
         })
@@ -339,10 +340,10 @@ impl JointRows {
         (sum / self.linear_target.len().max(1) as f64).sqrt()
     }
 
-    /// Each row becomes its mean with the `reach` rows on either side, or what it has beyond that mean. Rows near a gap
-    /// or an end are nothing after it.
-    fn smooth(&mut self, band: &Band, reach: usize, slow: bool) {
-        let m = self.columns.len();
+    /// Each row becomes what a kernel over it and its neighbours makes of it, or what it has beyond that. Rows near a gap or
+    /// an end are nothing after it.
+    fn smooth(&mut self, band: &Band, kernel: &Kernel, slow: bool) {
+        let (m, reach) = (self.columns.len(), kernel.reach);
         let episode = |i: usize| band.rows[self.rows[i]].episode;
         let whole = |i: usize| {
             let (first, last) = (i.checked_sub(reach), i + reach);
@@ -352,17 +353,15 @@ impl JointRows {
                     && episode(first) == episode(last)
             })
         };
-        let part = |own: f64, sum: f64| {
-            let mean = sum / (2 * reach + 1) as f64;
-            if slow { mean } else { own - mean }
-        };
+        let part = |own: f64, smooth: f64| if slow { smooth } else { own - smooth };
         let (mut values, mut target) = (vec![0.0; self.values.len()], vec![0.0; self.target.len()]);
         for i in 0..self.rows.len() {
             let Some(first) = whole(i) else { continue };
-            let near = first..=i + reach;
-            target[i] = part(self.target[i], self.target[near.clone()].iter().sum());
+            target[i] = part(self.target[i], apply(&kernel.value, &self.target, first));
             for c in 0..m {
-                values[i * m + c] = part(self.values[i * m + c], near.clone().map(|k| self.values[k * m + c]).sum());
+                let column = self.values[first * m + c..].iter().step_by(m);
+                let smooth = kernel.value.iter().zip(column).map(|(weight, x)| weight * x).sum();
+                values[i * m + c] = part(self.values[i * m + c], smooth);
             }
         }
         (self.values, self.target) = (values, target);

@@ -2,8 +2,10 @@
 
 use gapscope_datasets::{Recipe, generate};
 use gapscope_diagnosis::schema::{Parameter, Quantity, Verdict};
+use gapscope_dynamics::{Inertia, Model};
 use gapscope_effects::{Armature, Backlash, Effect, JointElasticity};
 use gapscope_tests::{diagnose, inertia_about, robot, rotors, simulate};
+use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 
 const JOINT: usize = 2;
@@ -16,13 +18,9 @@ fn named(play: Option<f64>, rotor: f64, motor_encoders: bool) {
     let name = model.joints()[JOINT].name.clone();
     let inertia = inertia_about(&model, &name);
     let on = |value: f64| -> BTreeMap<String, f64> { [(name.clone(), value)].into() };
-    let stiffness = inertia * (std::f64::consts::TAU * RESONANCE).powi(2);
     let drive = match play {
         Some(gap) => Effect::Backlash(Backlash { gap: on(gap) }),
-        None => Effect::JointElasticity(JointElasticity {
-            stiffness: on(stiffness),
-            damping: on(0.1 * (stiffness * inertia).sqrt()),
-        }),
+        None => Effect::JointElasticity(spring(&model, &name, RESONANCE)),
     };
     let effects = [drive.clone(), Effect::Armature(Armature { armature: on(rotor * inertia) })];
     let recipe = Recipe { seconds: 10.0, motor_encoders, ..Recipe::default() };
@@ -70,15 +68,21 @@ fn wide_play_before_a_light_rotor() {
     named(Some(0.05), 0.5, false);
 }
 
+/// A spring on which a link swings at so many Hz while its motor is locked.
+fn spring(model: &Model, joint: &str, resonance: f64) -> JointElasticity {
+    let inertia = inertia_about(model, joint);
+    let stiffness = inertia * (std::f64::consts::TAU * resonance).powi(2);
+    let on = |value: f64| -> BTreeMap<String, f64> { [(joint.to_owned(), value)].into() };
+    JointElasticity { stiffness: on(stiffness), damping: on(0.1 * (stiffness * inertia).sqrt()) }
+}
+
 /// Above the resonance of rotor and link, a spring's account of the torque multiplies the noise of the encoder: seen as they
 /// are, this spring leaves as much as a rigid drive.
 #[test]
 fn a_spring_that_noise_drowns() {
     let model = robot("arm6");
-    let inertia = inertia_about(&model, "joint2");
-    let stiffness = inertia * (4.0 * std::f64::consts::TAU).powi(2);
-    let on = |value: f64| -> BTreeMap<String, f64> { [("joint2".to_owned(), value)].into() };
-    let spring = JointElasticity { stiffness: on(stiffness), damping: on(0.1 * (stiffness * inertia).sqrt()) };
+    let spring = spring(&model, "joint2", 4.0);
+    let stiffness = spring.stiffness["joint2"];
     let effects = [rotors(&model), Effect::JointElasticity(spring)];
     let logs: Vec<_> = (1..4).map(|seed| simulate(&model, &effects, seed, 8.0, 250.0, 2e-5)).collect();
     let diagnosis = diagnose(&model, &logs).diagnosis;
@@ -89,4 +93,27 @@ fn a_spring_that_noise_drowns() {
     let Some(Parameter::PerJoint(map)) = diagnosis.effects[1].parameters.get("stiffness") else { panic!("{told}") };
     let Quantity::Scalar(value) = map["joint2"].value else { panic!("{told}") };
     assert!((value / stiffness - 1.0).abs() < 0.2, "{told}");
+}
+
+/// The last link of some URDFs is a point on the axis of its joint (the TX40's): whatever is left there, nothing could swing
+/// behind a spring.
+#[test]
+fn no_drive_turns_a_link_without_inertia() {
+    let arm = robot("arm6");
+    let point = Inertia::from_com(arm.joints()[5].inertia.mass, DVec3::ZERO, DMat3::ZERO);
+    let rotors = rotors(&arm);
+    let model = arm.with_inertia(5, point);
+    let logs: Vec<_> = (1..4)
+        .map(|seed| {
+            let mut log = simulate(&model, std::slice::from_ref(&rotors), seed, 8.0, 250.0, 2e-5);
+            for (k, effort) in log.effort[5].iter_mut().enumerate() {
+                *effort += 0.1 * (0.03 * k as f64).sin();
+            }
+            log
+        })
+        .collect();
+    let diagnosis = diagnose(&model, &logs).diagnosis;
+    let told = format!("{:?} {:#?}", diagnosis.verdict, diagnosis.effects);
+    let turns = |kind: &str| ["joint_elasticity", "backlash"].contains(&kind);
+    assert!(diagnosis.effects.iter().all(|e| !turns(&e.kind) || !e.joints.contains(&"joint6".to_owned())), "{told}");
 }

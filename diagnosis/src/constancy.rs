@@ -15,8 +15,8 @@ use rayon::prelude::*;
 
 /// Two thirds disagree where their torques differ by this part of the greater.
 const APART: f64 = 0.35;
-/// Frequencies that part slow from fast, Hz. What shakes a joint makes most of its acceleration there, and its sign at any
-/// lower frequency is small: the parting must be sharp and must reach down to the motion alone.
+/// Frequencies that part slow from fast, Hz. Below what shakes a joint lies its motion alone, a small part of its acceleration:
+/// the parting must be sharp, and reach down to that.
 const PARTINGS: [f64; 3] = [1.6, 0.8, 0.4];
 /// Slow and fast fits disagree where they lie so many standard errors apart, too: each holds little of some laws, ...
 const BEYOND_NOISE: f64 = 3.0;
@@ -183,7 +183,7 @@ pub(crate) mod tests {
         (signals, band, problem, fit)
     }
 
-    /// What falls apart of it.
+    /// What falls apart of it, all being in doubt.
     fn fitted_as(kind: Kind, done: impl Fn(&mut Signals)) -> Vec<(usize, f64)> {
         let (signals, band, problem, fit) = fitted(kind, done);
         inconsistent(&problem, &fit, &signals, &band, |_| true)
@@ -201,20 +201,21 @@ pub(crate) mod tests {
         assert!(apart.len() == 1 && apart[0].1 > 0.5, "{apart:?}");
     }
 
-    /// Something shakes the joint, slower or faster: effort and acceleration go together, at any speed, anywhere and at any
-    /// time, but at the frequency of the shaking alone.
+    /// Something shakes the first joint: effort and acceleration go together, at any speed, anywhere and at any time, but at
+    /// the frequency of the shaking alone, or as well by a part `everything` of all acceleration.
+    fn shaken(frequency: f64, everything: f64) -> impl Fn(&mut Signals) {
+        move |s| {
+            let size = (s.a[0].iter().map(|a| a * a).sum::<f64>() / s.len() as f64).sqrt();
+            for k in 0..s.len() {
+                let shake = 10.0 * size * (std::f64::consts::TAU * frequency * k as f64 * s.dt).sin();
+                s.tau[0][k] += 0.02 * (shake + everything * s.a[0][k]);
+                s.a[0][k] += shake;
+            }
+        }
+    }
+
     #[test]
     fn a_law_holds_in_slow_changes_and_in_fast_ones() {
-        let shaken = |frequency: f64, everything: f64| {
-            move |s: &mut Signals| {
-                let size = (s.a[0].iter().map(|a| a * a).sum::<f64>() / s.len() as f64).sqrt();
-                for k in 0..s.len() {
-                    let shake = 10.0 * size * (std::f64::consts::TAU * frequency * k as f64 * s.dt).sin();
-                    s.tau[0][k] += 0.02 * (shake + everything * s.a[0][k]);
-                    s.a[0][k] += shake;
-                }
-            }
-        };
         for frequency in [1.2, 4.0] {
             assert_eq!(fitted_as(Kind::Armature, shaken(frequency, 1.0)), []);
             let apart = fitted_as(Kind::Armature, shaken(frequency, 0.0));
@@ -222,5 +223,22 @@ pub(crate) mod tests {
         }
         // A constant has nothing that is fast.
         assert_eq!(fitted_as(Kind::TorqueBias, torque(|_| 0.5)), []);
+    }
+
+    #[test]
+    fn slow_and_fast_are_asked_beyond_doubt_too_where_blocks_tell_the_noise() {
+        let (signals, band, problem, fit) = fitted(Kind::Armature, shaken(1.2, 0.0));
+        let fallen = |blocks: usize| {
+            let part = problem.masked(&band, |row| band.rows[row].block < blocks);
+            inconsistent(&part, &fit, &signals, &band, |_| false).len()
+        };
+        assert_eq!((fallen(band.blocks), fallen(BLOCKS - 1)), (1, 0));
+        let (signals, band, problem, fit) = fitted(Kind::ViscousFriction, torque(|v| 0.5 * v * v.abs()));
+        assert_eq!(inconsistent(&problem, &fit, &signals, &band, |_| false), []);
+    }
+
+    #[test]
+    fn a_law_that_fits_to_nothing_has_no_place() {
+        assert_eq!(fitted_as(Kind::ViscousFriction, torque(|v| -0.5 * v)), [(0, 1.0)]);
     }
 }

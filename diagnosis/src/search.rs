@@ -182,14 +182,15 @@ impl Logs<'_> {
             let doubt = much && open.judged.leaves_any();
             return self.constant(open.chosen, doubt, |_| true);
         }
+        let constant = |Tried { chosen, judged, .. }: Tried| {
+            self.constant(chosen, judged.leaves_much(), |candidate| judged.doubts(&candidate.joints))
+        };
         if best.kinds.is_empty() || !best.judged.spoils() {
-            let judged = &best.judged;
-            return self.constant(best.chosen, judged.leaves_much(), |candidate| judged.doubts(&candidate.joints));
+            return constant(best);
         }
         let modest = without(&REACHING)?;
         if modest.kinds.is_empty() || !modest.judged.spoils() {
-            let judged = &modest.judged;
-            return self.constant(modest.chosen, judged.leaves_much(), |candidate| judged.doubts(&candidate.joints));
+            return constant(modest);
         }
         let choice = select::evaluate(&modest.chosen.all, Vec::new());
         let (exact, fit) = self.data(&modest.chosen.noise).refine(&[])?;

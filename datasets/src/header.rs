@@ -55,7 +55,10 @@ pub(crate) fn plan(columns: &[String], joints: &[String], map: &ColumnMap) -> Re
         .hint(header.known_joints()));
     }
     for channel in Channel::ALL {
-        let found = joints.iter().map(|joint| header.feed(channel, joint)).collect::<Result<Vec<_>, _>>()?;
+        let mut found = joints.iter().map(|joint| header.feed(channel, joint)).collect::<Result<Vec<_>, _>>()?;
+        if channel == Channel::Effort {
+            header.take_effort_of_link(&mut found, &mut plan)?;
+        }
         used.extend(found.iter().flatten().map(|feed| feed.index));
         header.take(channel, found, &mut plan)?;
     }
@@ -179,6 +182,28 @@ impl Header<'_> {
             !column.is_empty() && (column.contains(&wanted) || wanted.contains(&column))
         };
         self.columns.iter().filter(resembles).cloned().collect()
+    }
+
+    /// Where only the torque on the link's side of the gear is logged, it is the effort: what acts behind the sensor,
+    /// rotor and friction of the motor, is not in it.
+    fn take_effort_of_link(&self, found: &mut [Option<Feed>], plan: &mut Plan) -> Result<(), LogError> {
+        let mut taken = Vec::new();
+        for (feed, joint) in found.iter_mut().zip(self.joints) {
+            if feed.is_none() {
+                *feed =
+                    self.feed(Channel::EffortLink, joint)?.map(|link| Feed { channel: Some(Channel::Effort), ..link });
+                if feed.is_some() {
+                    taken.push(joint.clone());
+                }
+            }
+        }
+        if !taken.is_empty() {
+            plan.notes.push(format!(
+                "has no column effort.* for {}: effort_link.* is read as the effort; rotor and friction on the motor's side of the gear do not show in it",
+                taken.join(", ")
+            ));
+        }
+        Ok(())
     }
 
     /// Enters a channel in the plan, where every joint has it.
@@ -341,6 +366,19 @@ mod tests {
         let plan = planned(&format!("{FULL},disturbance.b"), &[]).unwrap();
         assert_eq!(plan.channels.last(), Some(&Channel::Disturbance));
         assert_eq!(plan.undisturbed, [0]);
+    }
+
+    #[test]
+    fn effort_of_the_link_stands_in_where_there_is_no_other() {
+        let plan = planned("time,position.a,position.b,effort_link.a,effort_link.b", &[]).unwrap();
+        assert_eq!(plan.channels, [Channel::Position, Channel::Effort, Channel::EffortLink]);
+        assert_eq!(plan.feeds.iter().map(|feed| feed.index).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 3, 4]);
+        assert!(plan.notes.len() == 1 && plan.notes[0].contains("effort_link.* is read"), "{:?}", plan.notes);
+        // A joint's own effort is preferred, joint by joint.
+        let plan = planned("time,position.a,position.b,effort.a,effort_link.a,effort_link.b", &[]).unwrap();
+        assert_eq!(plan.feeds[3..5].iter().map(|feed| feed.index).collect::<Vec<_>>(), [3, 5]);
+        let error = planned("time,position.a,position.b,effort_link.a", &[]).unwrap_err();
+        assert_eq!(error.kind, LogErrorKind::MissingJoint);
     }
 
     #[test]

@@ -66,16 +66,6 @@ pub enum UrdfError {
         /// What may have happened.
         hint: &'static str,
     },
-    /// An element stands twice where one is expected.
-    #[error("{about} has a second <{element}> (line {line}), expected one: delete the one that does not hold")]
-    Repeated {
-        /// The link or joint.
-        about: String,
-        /// The element.
-        element: String,
-        /// Line of the second, from 1.
-        line: u32,
-    },
     /// Two links or two joints share a name.
     #[error("two {what}s are named `{name}` (lines {first} and {second}), expected each name once: rename one")]
     Duplicate {

@@ -110,7 +110,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The children of these names, each at most once; all others are noted as not read.
+    /// The first child of each of these names, as the ROS parser takes it; a second one is a finding, all others are
+    /// noted as not read.
     pub(super) fn children<const N: usize>(
         &mut self,
         node: Node<'a, 'a>,
@@ -125,9 +126,12 @@ impl<'a> Reader<'a> {
                 self.note(format!("<{}>", element.tag_name().name()));
                 continue;
             };
-            if slot.replace(element).is_some() {
-                let (about, element) = (about.into(), (element.tag_name().name().to_owned(), self.line(element)));
-                return Err(UrdfError::Repeated { about, element: element.0, line: element.1 });
+            if slot.is_some() {
+                let (name, line) = (element.tag_name().name(), self.line(element));
+                let message = format!("has a second <{name}> (line {line}): the first counts; delete the other");
+                self.findings.push(Finding::new(about, message));
+            } else {
+                *slot = Some(element);
             }
         }
         Ok(found)

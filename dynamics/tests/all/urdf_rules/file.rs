@@ -85,10 +85,20 @@ fn elements_of_other_namespaces_are_not_urdf() {
 }
 
 #[test]
-fn elements_stand_once() {
-    refused(&with(INERTIAL, &format!("{INERTIAL}{INERTIAL}")), &["link `upper`", "second <inertial>", "line 3"]);
-    refused(&with(LIMIT, &format!("{LIMIT}{LIMIT}")), &["joint `shoulder`", "second <limit>"]);
-    refused(&with("<mass value=\"2\"/>", "<mass value=\"2\"/><mass value=\"3\"/>"), &["link `upper`", "second <mass>"]);
+fn of_two_elements_the_first_counts_and_the_second_is_a_finding() {
+    let twice = |first: &str, second: &str| with(first, &format!("{first}{second}"));
+    let heavier = INERTIAL.replace("value=\"2\"", "value=\"3\"");
+    let about = "link `upper`";
+    let loaded = found(&twice(INERTIAL, &heavier), about, &["second <inertial>", "line 3", "the first counts"]);
+    assert_eq!(loaded.model.joints()[0].inertia.mass, 2.0);
+    let loaded = found(&twice("<mass value=\"2\"/>", "<mass value=\"3\"/>"), about, &["second <mass>"]);
+    assert_eq!(loaded.model.joints()[0].inertia.mass, 2.0);
+    found(&twice(LIMIT, LIMIT), "joint `shoulder`", &["second <limit>"]);
+    let origin = r#"<origin xyz="0 0 1"/>"#;
+    let moved = arm().replacen("<parent ", &format!("{origin}<origin xyz=\"0 0 9\"/><parent "), 1);
+    let once = arm().replacen("<parent ", &format!("{origin}<parent "), 1);
+    let loaded = found(&moved, "joint `shoulder`", &["second <origin>", "the first counts"]);
+    assert_eq!(loaded.model.joints()[0].placement, load(&once).model.joints()[0].placement);
 }
 
 #[test]

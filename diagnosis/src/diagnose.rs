@@ -495,6 +495,7 @@ impl Logs<'_> {
                 FoundEffect {
                     kind: kind.name().to_owned(),
                     joints: effect.law().joints(),
+                    part: if kind.is_calibration() { Part::Calibration } else { Part::Further },
                     confidence: calibrated((1.0 - doubt) * (1.0 - misfit).powi(MISFIT)),
                     parameters: fit.parameters(problem, self.model, kind, &own, &speeds),
                     indistinguishable_from: confused,

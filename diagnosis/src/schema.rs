@@ -164,6 +164,17 @@ pub struct Bounds {
     pub interval: [Option<f64>; 2],
 }
 
+/// What an effect is a part of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// Bodies, friction, rotor, bias: a little off on every used robot.
+    Calibration,
+    /// Anything else.
+    #[default]
+    Further,
+}
+
 /// One effect that was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FoundEffect {
@@ -171,6 +182,9 @@ pub struct FoundEffect {
     pub kind: String,
     /// Joints affected, by name; empty for robot-wide effects.
     pub joints: Vec<String>,
+    /// Whether it is calibration or something further.
+    #[serde(default)]
+    pub part: Part,
     /// Probability that the effect is there.
     pub confidence: f64,
     /// Parameters by public name.

@@ -117,6 +117,14 @@ impl Kind {
     /// Laws that the catalogue does not have: what its effects are held against. No [`crate::Effect`] is of such a kind.
     pub const OUTSIDE: [Kind; 5] = [Kind::LinkDrag, Kind::JointDrag, Kind::Swing, Kind::Rub, Kind::Catch];
 
+    /// Whether it is calibration: bodies, friction, rotor and bias, which are a little off on every used robot.
+    pub fn is_calibration(self) -> bool {
+        matches!(
+            self,
+            Kind::ViscousFriction | Kind::CoulombFriction | Kind::LinkInertiaError | Kind::Armature | Kind::TorqueBias
+        )
+    }
+
     /// Whether the catalogue does not have it.
     pub fn is_outside(self) -> bool {
         Kind::OUTSIDE.contains(&self)

@@ -5,7 +5,7 @@
 
 use crate::effect::{Law, Value, check};
 use crate::{EffectError, Kind, Plant};
-use gapscope_dynamics::Inertia;
+use gapscope_dynamics::{Inertia, Model};
 use serde::{Deserialize, Serialize};
 
 /// Differences of a link's inertial parameters, frame of the link, inertia about its origin.
@@ -71,6 +71,28 @@ impl LinkInertiaError {
     }
 }
 
+/// What a link may be off by from its URDF, as standard deviations: mass, as a part of it, ...
+const MASS: f64 = 0.3;
+/// ... centre of mass, m, ...
+const CENTER: f64 = 0.03;
+/// ... and inertia, as a part of it.
+const INERTIA: f64 = 0.5;
+/// Least mass that a link is taken to have, as a part of the robot's: some URDFs have links without inertia.
+const LEAST: f64 = 0.01;
+
+/// Plausible sizes of the ten coefficients, standard deviations about the URDF: kg, kg m, kg m².
+/// A mass that is off is so at its lever; the centre moves the inertia as well.
+pub(crate) fn scales(model: &Model, joint: usize) -> Vec<f64> {
+    let total: f64 = model.joints().iter().map(|j| j.inertia.mass).sum();
+    let body = &model.joints()[joint].inertia;
+    let mass = body.mass.max(LEAST * total);
+    let lever = body.first_moment.length() / mass;
+    let moment = mass * CENTER.hypot(MASS * lever);
+    let rotational = (body.rotational.x_axis.x + body.rotational.y_axis.y + body.rotational.z_axis.z).max(0.0);
+    let inertia = INERTIA * rotational + mass * CENTER * (CENTER + 2.0 * lever);
+    [&[MASS * mass][..], &[moment; 3], &[inertia; 6]].concat()
+}
+
 /// The error with these ten coefficients of the link's regressor.
 pub(crate) fn from_coefficients(joint: &str, c: &[f64; 10]) -> LinkInertiaError {
     LinkInertiaError {
@@ -78,5 +100,24 @@ pub(crate) fn from_coefficients(joint: &str, c: &[f64; 10]) -> LinkInertiaError 
         mass_delta: c[0],
         first_moment_delta: [c[1], c[2], c[3]],
         inertia_delta: [c[4], c[5], c[6], c[7], c[8], c[9]],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gapscope_dynamics::robots;
+
+    #[test]
+    fn a_link_is_plausible_by_its_own_size_and_one_without_inertia_by_the_robots() {
+        let model = robots::model("arm6").unwrap().unwrap().model;
+        let total: f64 = model.joints().iter().map(|j| j.inertia.mass).sum();
+        for j in 0..model.dof() {
+            let scales = scales(&model, j);
+            assert!(scales.iter().all(|s| s.is_finite() && *s > 0.0), "{j}: {scales:?}");
+            assert_eq!(scales[0], MASS * model.joints()[j].inertia.mass.max(LEAST * total));
+        }
+        let bare = model.clone().with_inertia(2, Inertia::from_parameters(&[0.0; 10]));
+        assert!(super::scales(&bare, 2).iter().all(|s| *s > 0.0));
     }
 }

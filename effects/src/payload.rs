@@ -7,7 +7,7 @@
 use crate::effect::{Law, Value, check};
 use crate::signature::Column;
 use crate::{EffectError, Kind, Motion, Plant};
-use gapscope_dynamics::{Data, Inertia};
+use gapscope_dynamics::{Data, Inertia, Model};
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, Matrix3};
 use serde::{Deserialize, Serialize};
@@ -97,6 +97,17 @@ pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     columns
 }
 
+/// Mass of a plausible payload, as a part of the robot's: a standard deviation, ...
+const MASS: f64 = 0.2;
+/// ... and where it is held, m from the last link's origin.
+const LEVER: f64 = 0.15;
+
+/// Plausible sizes of the ten coefficients, standard deviations about no payload: kg, kg m, kg m².
+pub(crate) fn scales(model: &Model) -> Vec<f64> {
+    let mass = MASS * model.joints().iter().map(|j| j.inertia.mass).sum::<f64>();
+    [&[mass][..], &[mass * LEVER; 3], &[mass * LEVER * LEVER; 6]].concat()
+}
+
 /// The physical body nearest to ten inertial parameters; `None` where they have neither mass nor moments.
 /// Where the mass is negative, a physical body is missing from the link.
 ///
@@ -122,7 +133,9 @@ pub(crate) fn from_coefficients(joint: &str, parameters: &[f64; 10]) -> Option<P
         * second.eigenvectors.transpose();
     let i = Matrix3::identity() * clamped.trace() - clamped;
     let sign = if missing { -1.0 } else { 1.0 };
-    Some(Payload {
+    // A first moment beside next to no mass overflows: no body has it.
+    let finite = com.is_finite() && i.iter().all(|x| x.is_finite());
+    finite.then(|| Payload {
         joint: joint.to_owned(),
         mass: sign * mass,
         com: com.to_array(),
@@ -152,6 +165,13 @@ mod tests {
         for (x, y) in back.com.iter().zip(body.com).chain(back.inertia.iter().zip(body.inertia)) {
             assert_relative_eq!(*x, y, epsilon = 1e-12);
         }
+    }
+
+    #[test]
+    fn moments_beside_next_to_no_mass_are_no_body() {
+        let mut parameters = [0.0; 10];
+        (parameters[0], parameters[1]) = (1e-300, 0.1);
+        assert_eq!(from_coefficients("flange", &parameters), None);
     }
 
     #[test]

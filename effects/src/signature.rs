@@ -254,6 +254,16 @@ impl Candidate {
         }
     }
 
+    /// Standard deviations of the coefficients about nothing that are plausible for a robot, in the order of
+    /// [`Candidate::columns`]; `None` where any size is. What logs do not determine stays near nothing.
+    pub fn scales(&self, model: &Model) -> Option<Vec<f64>> {
+        match (self.kind, self.joints.as_slice()) {
+            (Kind::Payload, _) => Some(payload::scales(model)),
+            (Kind::LinkInertiaError, &[j]) => Some(link_inertia_error::scales(model, j)),
+            _ => None,
+        }
+    }
+
     /// The effects with these coefficients, in the order of [`Candidate::columns`]; none where no physical effect has them,
     /// and for laws outside the catalogue.
     /// An elastic drive and play come with their rotor's inertia.

@@ -38,6 +38,8 @@ pub struct Problem {
     pub entries: Vec<Entry>,
     /// Least and greatest value of each coefficient.
     pub bounds: Vec<(f64, f64)>,
+    /// Precision that each coefficient has before any log is seen, 1 over the square of its unit: 0 where any size is plausible.
+    prior: Vec<f64>,
     /// Time between two samples of the fastest log, s.
     pub sample: f64,
     /// Typical effort of each joint, N m or N.
@@ -80,6 +82,7 @@ impl Problem {
         let half_sample = 0.5 * sample;
         let mut entries = Vec::new();
         let mut bounds = vec![(-half_sample, half_sample)];
+        let mut prior = vec![0.0];
         let mut joints: Vec<JointRows> = (0..n)
             .map(|_| JointRows {
                 columns: vec![],
@@ -102,6 +105,9 @@ impl Problem {
                 for (term, columns) in terms.iter().zip(&columns) {
                     let begin = bounds.len();
                     bounds.extend(columns.iter().map(|c| (c.at_least, c.at_most)));
+                    let scales = term.candidate.scales(model).unwrap_or_default();
+                    prior.extend(scales.iter().map(|scale| scale.powi(-2)));
+                    prior.resize(bounds.len(), 0.0);
                     let tangent = term.tangent_at.is_some();
                     let candidate = term.candidate.clone();
                     entries.push(Entry { candidate, columns: begin..bounds.len(), rank: 0, tangent, held: Vec::new() });
@@ -155,6 +161,7 @@ impl Problem {
         Problem {
             entries,
             bounds,
+            prior,
             sample,
             scale,
             noise: noise.to_vec(),

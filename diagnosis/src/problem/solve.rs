@@ -103,20 +103,22 @@ impl Problem {
         self.sandwich(columns, &scores)
     }
 
-    /// Bread and meat of some scores, each of a group of rows that may depend on each other as they like.
+    /// Bread and meat of some scores, each of a group of rows that may depend on each other as they like. What was plausible
+    /// before any row was seen is a score too: without it, an interval of what the rows do not determine would be nothing.
     fn sandwich(&self, columns: &[usize], scores: &[DVector<f64>]) -> DMatrix<f64> {
         let (m, used) = (columns.len(), scores.len());
         let meat = scores.iter().fold(DMatrix::zeros(m, m), |meat, score| meat + score * score.transpose());
         let bread = self.regular(columns, &self.total).cholesky().map(|c| c.inverse());
         let Some(bread) = bread else { return DMatrix::from_element(m, m, f64::INFINITY) };
         let factor = if used > 1 { used as f64 / (used - 1) as f64 } else { f64::INFINITY };
-        &bread * meat * &bread * factor
+        let prior = DMatrix::from_diagonal(&DVector::from_fn(m, |i, _| self.prior[columns[i]]));
+        &bread * (meat * factor + prior) * &bread
     }
 
     fn regular(&self, columns: &[usize], normal: &Normal) -> DMatrix<f64> {
         let mut gram = DMatrix::from_fn(columns.len(), columns.len(), |i, j| normal.gram[(columns[i], columns[j])]);
         for i in 0..columns.len() {
-            gram[(i, i)] = gram[(i, i)] * (1.0 + RIDGE) + f64::MIN_POSITIVE.sqrt();
+            gram[(i, i)] = gram[(i, i)] * (1.0 + RIDGE) + f64::MIN_POSITIVE.sqrt() + self.prior[columns[i]];
         }
         gram
     }
@@ -162,7 +164,9 @@ impl Problem {
                         step * rest[0]
                     };
                 }
-                (0..k).for_each(|i| schur[(i, i)] += GAIN_RIDGE * size[i] + f64::MIN_POSITIVE.sqrt());
+                (0..k).for_each(|i| {
+                    schur[(i, i)] += GAIN_RIDGE * size[i] + f64::MIN_POSITIVE.sqrt() + self.prior[own.start + i];
+                });
                 schur.cholesky().map_or(0.0, |f| rest.dot(&f.solve(&rest)))
             })
             .collect()

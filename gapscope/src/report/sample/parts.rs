@@ -43,6 +43,7 @@ pub fn found(
     FoundEffect {
         kind: kind.into(),
         joints: joints.to_vec(),
+        part: Part::default(),
         confidence,
         parameters: parameters.iter().map(|(name, p)| ((*name).to_string(), p.clone())).collect(),
         indistinguishable_from: vec![],

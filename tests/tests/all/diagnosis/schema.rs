@@ -86,8 +86,15 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
     let effects = json["effects"].as_array().unwrap();
     assert_eq!(effects.len(), 3);
     for effect in effects {
-        assert_keys(effect, &["kind", "joints", "confidence", "parameters", "indistinguishable_from", "shrink"], &[]);
+        assert_keys(
+            effect,
+            &["kind", "joints", "part", "confidence", "parameters", "indistinguishable_from", "shrink"],
+            &[],
+        );
         assert_keys(&effect["shrink"], &["torque"], &["ci95"]);
+        let calibration = ["viscous_friction", "coulomb_friction", "link_inertia_error", "armature", "torque_bias"];
+        let part = if calibration.contains(&effect["kind"].as_str().unwrap()) { "calibration" } else { "further" };
+        assert_eq!(effect["part"], part);
         assert!((0.0..=1.0).contains(&effect["confidence"].as_f64().unwrap()));
     }
     let of = |kind: &str| effects.iter().find(|e| e["kind"] == kind).unwrap();

@@ -1,12 +1,12 @@
 //! From coefficients to effects with parameters and intervals.
 
 use crate::band::Band;
+use crate::climb::LATE;
 use crate::problem::Problem;
 use crate::schema::{Estimate, Parameter, Quantity};
-use crate::select::LATE;
 use crate::signals::Signals;
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::{Candidate, Effect, Kind, Value};
+use gapscope_effects::{Candidate, Effect, Kind, Value, keep_bodies};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -89,7 +89,10 @@ impl Fit {
 
     /// The effects, one a kind where the kind has a value per joint. Candidates whose coefficients no physical effect has are left out.
     pub fn effects(&self, problem: &Problem, model: &Model) -> Vec<Effect> {
-        self.effects_with_candidates(problem, model).into_iter().map(|(effect, _)| effect).collect()
+        let mut effects: Vec<Effect> =
+            self.effects_with_candidates(problem, model).into_iter().map(|(effect, _)| effect).collect();
+        keep_bodies(model, &mut effects);
+        effects
     }
 
     /// The effects, each with the candidates that it is made of.
@@ -226,7 +229,7 @@ fn insert(parameters: &mut BTreeMap<String, Parameter>, model: &Model, value: &V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constancy::tests::{fitted, torque};
+    use crate::support::{fitted, torque};
 
     /// A drag that grows with the square of the speed, fitted as one that grows with it, is too weak at any high speed and too
     /// strong at any low one: in every block of time the two are nearly even, and only parts of the speed tell.

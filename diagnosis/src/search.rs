@@ -58,20 +58,27 @@ pub(crate) struct Turned {
 impl Chosen {
     /// By how many nats this account of the logs is likelier than another, each at its exact law.
     pub fn odds_against(&self, other: &Chosen, logs: &Logs<'_>) -> Result<f64, EffectError> {
+        // What is left of the better account is nearer to noise: it says how many rows count as one.
         let counts: Vec<f64> =
-            self.exact.correlation().iter().zip(other.exact.correlation()).map(|(a, b)| a.max(*b)).collect();
+            self.exact.correlation().iter().zip(other.exact.correlation()).map(|(a, b)| a.min(*b)).collect();
         let (own, others) = (logs.noise_through(self)?, logs.noise_through(other)?);
-        let of = |chosen: &Chosen, noise: &[f64], rival: &[f64]| {
+        let of = |chosen: &Chosen, noise: &[f64], rival: &[f64], blows: bool| {
             let drive = if chosen.turns() { TURNS + (chosen.noise.len() as f64).ln() } else { 0.0 };
             let prior = Competition::new(&chosen.all).prior(&chosen.choice.set) - drive;
-            // An account that makes less of the noise than another leaves less of it, and has explained nothing by that.
+            // An account that makes less of the noise than another leaves less of it, and has explained nothing by that. One
+            // with blows makes anything of it.
             let quieter: f64 = (0..noise.len())
-                .filter(|&j| noise[j] < rival[j] && noise[j] > 0.0)
+                .filter(|&j| !blows && noise[j] < rival[j] && noise[j] > 0.0)
                 .map(|j| chosen.exact.rows(j) / counts[j] * (rival[j] / noise[j]).ln())
                 .sum();
             chosen.exact.evidence(&chosen.fit.columns, &chosen.fit.theta, &counts) + prior - quieter
         };
-        Ok(of(self, &own, &others) - of(other, &others, &own))
+        Ok(of(self, &own, &others, other.blows()) - of(other, &others, &own, self.blows()))
+    }
+
+    /// Whether a drive in it hits a stop, from which noise comes back as blows.
+    fn blows(&self) -> bool {
+        self.exact.entries.iter().any(|e| e.candidate.blows())
     }
 
     fn turns(&self) -> bool {

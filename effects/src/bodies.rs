@@ -4,7 +4,7 @@
 //! the link's origin, h the first (Wensing, Kim, Slotine, IEEE RA-L 3(1) 2018, eq. 8). In units of the nominal link, J_0 = L Lᵀ,
 //! a link that is off by little has L⁻¹ J L⁻ᵀ near one; eigenvalues below a least one are raised to it.
 
-use crate::Effect;
+use crate::{Effect, Payload};
 use gapscope_dynamics::{Inertia, Model};
 use glam::{DMat3, DVec3};
 use nalgebra::Matrix4;
@@ -16,47 +16,54 @@ const BALL: (f64, f64) = (1e-3, 0.03);
 /// Halvings towards the largest part of a payload that leaves its link a body.
 const HALVINGS: usize = 40;
 
-/// Moves link errors and payloads as little as makes a body of every link with what it carries.
+/// Moves link errors and payloads as little as makes a body of every link, and of every link with what it carries.
 pub fn keep_bodies(model: &Model, effects: &mut [Effect]) {
     for (j, joint) in model.joints().iter().enumerate() {
-        let (nominal, ball) = reference(model, j);
-        let carried = effects.iter().fold(Inertia::ZERO, |sum, effect| match effect {
-            Effect::Payload(payload) if payload.joint == joint.name => sum.add(&payload.link_inertia()),
-            _ => sum,
-        });
-        let error = effects.iter_mut().find_map(|effect| match effect {
-            Effect::LinkInertiaError(error) if error.joint == joint.name => Some(error),
-            _ => None,
-        });
-        if let Some(error) = error {
-            let total = nominal.add(&carried).add(&Inertia::from_parameters(&error.coefficients()));
-            if let Some(body) = raised(&total, &ball) {
-                let parameters = body.parameters();
-                let beside = nominal.add(&carried).parameters();
-                let left: [f64; 10] = std::array::from_fn(|i| parameters[i] - beside[i]);
+        let (nominal, unit) = reference(model, j);
+        // A load that is missing leaves a body; one that is there is a body of its own.
+        let mut link = nominal.clone();
+        for effect in effects.iter_mut() {
+            if let Effect::Payload(payload) = effect
+                && payload.joint == joint.name
+                && payload.mass < 0.0
+            {
+                lighten(payload, &link, &unit);
+                link = link.add(&payload.link_inertia());
+            }
+        }
+        for effect in effects.iter_mut() {
+            if let Effect::LinkInertiaError(error) = effect
+                && error.joint == joint.name
+                && let Some(body) = raised(&link.add(&Inertia::from_parameters(&error.coefficients())), &unit)
+            {
+                let (body, link) = (body.parameters(), link.parameters());
+                let left: [f64; 10] = std::array::from_fn(|i| body[i] - link[i]);
                 error.mass_delta = left[0];
                 error.first_moment_delta = [left[1], left[2], left[3]];
                 error.inertia_delta = [left[4], left[5], left[6], left[7], left[8], left[9]];
             }
-            continue;
-        }
-        for effect in effects.iter_mut() {
-            let Effect::Payload(payload) = effect else { continue };
-            if payload.joint != joint.name || raised(&nominal.add(&payload.link_inertia()), &ball).is_none() {
-                continue;
-            }
-            let whole = payload.clone();
-            let (mut low, mut high) = (0.0, 1.0);
-            for _ in 0..HALVINGS {
-                let part = 0.5 * (low + high);
-                payload.mass = part * whole.mass;
-                payload.inertia = whole.inertia.map(|x| part * x);
-                if raised(&nominal.add(&payload.link_inertia()), &ball).is_none() { low = part } else { high = part }
-            }
-            payload.mass = low * whole.mass;
-            payload.inertia = whole.inertia.map(|x| low * x);
         }
     }
+}
+
+/// Leaves of a load that is missing the largest part that a link can lack.
+fn lighten(payload: &mut Payload, link: &Inertia, unit: &Inertia) {
+    let whole = payload.clone();
+    let scale = |payload: &mut Payload, part: f64| {
+        payload.mass = part * whole.mass;
+        payload.inertia = whole.inertia.map(|x| part * x);
+    };
+    let fits = |payload: &Payload| raised(&link.add(&payload.link_inertia()), unit).is_none();
+    if fits(payload) {
+        return;
+    }
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let part = 0.5 * (low + high);
+        scale(payload, part);
+        if fits(payload) { low = part } else { high = part }
+    }
+    scale(payload, low);
 }
 
 /// A link of the URDF, and the body whose size is the unit of its errors: itself, or a small ball where it is none.
@@ -99,7 +106,7 @@ fn from_pseudo(j: &Matrix4<f64>) -> Inertia {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{LinkInertiaError, Payload, Plant};
+    use crate::{LinkInertiaError, Plant};
     use gapscope_dynamics::robots;
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;

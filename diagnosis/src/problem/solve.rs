@@ -226,6 +226,6 @@ mod tests {
         assert!((error(0) / scales[0] - 1.0).abs() < 1e-6, "{} and {}", error(0), scales[0]);
         assert!((0..10).all(|i| error(i).is_finite() && theta[i].abs() < 5.0 * scales[i]), "{theta:?}, {scales:?}");
         // What they do determine is known far better than it was.
-        assert!((0..10).any(|i| error(i) < 0.05 * scales[i]));
+        assert!((0..10).any(|i| error(i) < 0.1 * scales[i]));
     }
 }

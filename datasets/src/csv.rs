@@ -4,17 +4,10 @@ use crate::container::Contents;
 use crate::episode::{Channel, Episode};
 use crate::error::{LogError, LogErrorKind};
 use crate::header::{Plan, plan};
-use crate::read::ReadOptions;
-use crate::rows::{Columns, Rows, line_at, shown, unreadable};
+use crate::options::ReadOptions;
+use crate::rows::{ALLOW, Columns, Rows, line_at, shown, unreadable};
+use crate::table::Table;
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
-
-/// A file as read: one episode, gaps and all, and the line of the file at which each sample stands.
-#[derive(Debug)]
-pub(crate) struct Table {
-    pub episode: Episode,
-    pub rows: Vec<u32>,
-    pub notes: Vec<String>,
-}
 
 /// Reads a log's text. Errors do not carry the file's name yet.
 pub(crate) fn parse(contents: &Contents, joints: &[String], options: &ReadOptions) -> Result<Table, LogError> {
@@ -36,11 +29,13 @@ pub(crate) fn parse(contents: &Contents, joints: &[String], options: &ReadOption
     let plan = plan(&header, joints, &options.map).map_err(|error| separator_hint(error, &header, delimiter))?;
     notes.extend(plan.notes.iter().cloned());
     let mut columns = Rows::new(text, &plan, delimiter, options).read(&mut reader, &mut notes)?;
-    Ok(Table { rows: std::mem::take(&mut columns.lines), episode: assemble(columns, &plan, joints), notes })
+    Ok(Table {
+        label: String::new(),
+        rows: std::mem::take(&mut columns.lines),
+        episode: assemble(columns, &plan, joints),
+        notes,
+    })
 }
-
-pub(crate) const ALLOW: &str =
-    "Copy the file again, or say that logs may be truncated (--allow-truncated) to read up to there";
 
 fn open(text: &[u8]) -> (u8, Reader<&[u8]>) {
     let end = text.iter().position(|&byte| byte == b'\n' || byte == b'\r').unwrap_or(text.len());

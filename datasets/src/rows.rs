@@ -1,12 +1,15 @@
 //! The rows of a log's text, as numbers.
 
-use crate::csv::ALLOW;
 use crate::episode::Channel;
 use crate::error::{LogError, LogErrorKind};
 use crate::header::{Feed, Plan};
-use crate::read::ReadOptions;
+use crate::options::ReadOptions;
 use ::csv::{ByteRecord, Reader};
 use std::borrow::Cow;
+
+/// What mends a file that ends early.
+pub(crate) const ALLOW: &str =
+    "Copy the file again, or say that logs may be truncated (--allow-truncated) to read up to there";
 
 /// All rows of a log's text, by the feeds of its plan.
 pub(crate) struct Rows<'a> {

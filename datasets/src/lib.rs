@@ -6,6 +6,8 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod arrays;
+mod channel_names;
 mod check;
 mod column_map;
 mod container;
@@ -16,14 +18,17 @@ mod formats;
 mod generate;
 mod header;
 mod interpolate;
+mod joint_names;
 mod mend;
 mod options;
 mod perturb;
 mod range;
 mod read;
+mod recording;
 mod reference;
 mod resample;
 mod robust;
+mod ros;
 mod rows;
 mod scale;
 mod sensors;
@@ -32,6 +37,7 @@ mod table;
 mod time_stamps;
 mod trajectory;
 mod transitions;
+mod units;
 mod write;
 
 pub use check::check_logs;

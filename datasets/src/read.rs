@@ -75,7 +75,7 @@ fn read_file(path: &Path, name: &str, request: &Request) -> Result<(Vec<Episode>
     };
     formats::open(path)
         .and_then(|reader| reader.runs(request, &mut take))
-        .map_err(|error| error.file(path.display().to_string()))?;
+        .map_err(|error| if error.file.is_empty() { error.file(path.display().to_string()) } else { error })?;
     Ok((episodes, findings))
 }
 

@@ -7,6 +7,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod arrays;
+mod calibration;
 mod channel_names;
 mod check;
 mod column_map;
@@ -40,6 +41,7 @@ mod transitions;
 mod units;
 mod write;
 
+pub use calibration::Calibration;
 pub use check::check_logs;
 pub use column_map::{ColumnMap, Source};
 pub use episode::{Channel, Episode, Samples};

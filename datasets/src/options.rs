@@ -1,5 +1,6 @@
 //! How logs are read.
 
+use crate::calibration::Calibration;
 use crate::column_map::ColumnMap;
 
 /// How logs are read. The default is strict, for files with the native names.
@@ -11,6 +12,8 @@ pub struct ReadOptions {
     pub topics: Vec<String>,
     /// Ranges of episodes of a dataset that are read, both ends included; empty for all.
     pub episodes: Vec<(u64, u64)>,
+    /// What a per cent of a motor's range is, for LeRobot datasets whose positions are that.
+    pub calibration: Option<Calibration>,
     /// Read a file that ends in the middle of a row, or of its compressed data, up to its last whole row.
     pub allow_truncated: bool,
     /// Leave out files that cannot be read, with a finding, as long as one can.

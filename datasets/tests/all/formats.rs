@@ -1,6 +1,6 @@
 //! One run in every format, written by the tools that people write logs with (`tests/formats/make.py`).
 
-use gapscope_datasets::{ColumnMap, Episode, LogError, LogErrorKind, ReadOptions, read_logs};
+use gapscope_datasets::{Calibration, ColumnMap, Episode, LogError, LogErrorKind, ReadOptions, read_logs};
 use std::path::{Path, PathBuf};
 
 fn joints() -> Vec<String> {
@@ -183,6 +183,20 @@ fn episodes_of_lerobot_datasets() {
         let none = ReadOptions { episodes: vec![(5, 9)], ..ReadOptions::default() };
         assert_eq!(read_with(name, &none).unwrap_err().kind, LogErrorKind::Empty);
     }
+}
+
+#[test]
+fn a_calibration_turns_per_cent_into_rad() {
+    if !cfg!(feature = "parquet") {
+        return;
+    }
+    let motor = r#"{"range_min": 0, "range_max": 4095}"#;
+    let text = format!(r#"{{"shoulder": {motor}, "elbow": {motor}}}"#);
+    let options = ReadOptions { calibration: Some(Calibration::from_json(&text).unwrap()), ..ReadOptions::default() };
+    let (episodes, findings) = read_with("lerobot_v30", &options).unwrap();
+    let expected = truth().position[1][0] / 200.0 * std::f64::consts::TAU;
+    assert!((episodes[0].position[1][0] - expected).abs() < 1e-6, "{}", episodes[0].position[1][0]);
+    said(&findings, "per cent");
 }
 
 #[test]

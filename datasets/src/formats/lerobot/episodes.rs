@@ -170,7 +170,9 @@ impl Cut<'_, '_> {
             }
             for (at, name) in names.iter().enumerate() {
                 if let Some(name) = name {
-                    recording.add(name.clone(), column.values.iter().skip(at).step_by(width).copied().collect());
+                    let mut values: Vec<f64> = column.values.iter().skip(at).step_by(width).copied().collect();
+                    self.to_rad(name, &mut values)?;
+                    recording.add(name.clone(), values);
                 }
             }
         }
@@ -227,6 +229,19 @@ impl Cut<'_, '_> {
         }
     }
 
+    /// Turns per cent of a calibrated range into rad, where a calibration is given.
+    fn to_rad(&self, column: &str, values: &mut [f64]) -> Result<(), LogError> {
+        let Some(calibration) = &self.request.options.calibration else { return Ok(()) };
+        let motor = column.strip_prefix("position.").or_else(|| column.strip_prefix("command."));
+        match motor {
+            Some(motor) if !calibration.to_rad(motor, values) => {
+                Err(LogError::new(LogErrorKind::ColumnMap, format!("the calibration has no motor `{motor}`"))
+                    .hint("Give the calibration of the robot that recorded the dataset"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn notes(&self, recording: &mut Recording) {
         if !self.info.others.is_empty() {
             recording.notes.push(format!("features that are not read: {}", self.info.others.join(", ")));
@@ -237,9 +252,14 @@ impl Cut<'_, '_> {
                 .push("the dataset does not name its joints: they are taken in the robot's order".to_owned());
         }
         let robot = self.info.robot_type.to_lowercase();
-        if ["so100", "so101", "koch", "omx"].iter().any(|kind| robot.contains(kind)) {
+        if self.request.options.calibration.is_some() {
+            recording.notes.push(
+                "positions are read as per cent of the calibrated range, from its middle: the robot's zero may lie elsewhere"
+                    .to_owned(),
+            );
+        } else if ["so100", "so101", "koch", "omx"].iter().any(|kind| robot.contains(kind)) {
             recording.notes.push(format!(
-                "a {} records positions in degrees, or in per cent of its calibrated range: the column map must scale them to rad",
+                "a {} records positions in degrees, or in per cent of its calibrated range, of which scale and zero are unknown without --calibration FILE",
                 self.info.robot_type
             ));
         }

@@ -111,6 +111,10 @@ fn require(channels: &[Channel], arrays: &[Array], request: &Request) -> Result<
         if !channels.contains(&needed) && !by_link {
             let held: Vec<String> =
                 arrays.iter().take(12).map(|array| format!("{} {:?}", array.name, array.shape)).collect();
+            if arrays.iter().any(|array| array.name.starts_with("observation.")) {
+                return Err(LogError::new(LogErrorKind::MissingColumn, "this is a part of a LeRobot dataset")
+                    .hint("Give the dataset's folder, with meta/info.json in it; --episodes chooses"));
+            }
             let joint = request.joints.first().map_or("joint1", String::as_str);
             return Err(LogError::new(
                 LogErrorKind::MissingColumn,

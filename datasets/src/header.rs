@@ -267,8 +267,11 @@ impl Header<'_> {
             format!("If one of {} holds it: --map \"{target}={}\"", list(&near, 3), near[0])
         } else if !foreign.is_empty() {
             format!("If one of {} holds it: --map \"{target}=<that column>\"", list(&foreign, 6))
+        } else if channel == Channel::Effort && missing.len() == self.joints.len() {
+            "A diagnosis needs the torque of the drives in N m: record it, or map the motor current to it with the torque constant as its scale"
+                .to_owned()
         } else {
-            "Log every joint of the URDF, or make joints that do not move `fixed` in the URDF".to_owned()
+            "Log every joint of the robot, or hold those that do not move: --lock".to_owned()
         })
     }
 

@@ -100,6 +100,9 @@ impl Topics {
     /// The run that the topics hold of the robot.
     pub fn recording(self, request: &Request) -> Result<Recording, LogError> {
         let mut notes = Vec::new();
+        if let Some(missing) = request.options.topics.iter().find(|name| !self.topics.contains_key(*name)) {
+            return Err(self.nothing(&format!("{missing}, which was asked for, is no topic that is read")));
+        }
         for (name, topic) in self.topics.iter().filter(|(_, topic)| topic.broken > 0) {
             notes.push(format!(
                 "{} messages of {name} are damaged, or not as their definition says: left out",

@@ -130,7 +130,13 @@ fn bags_of_ros_2_as_folders() {
 #[test]
 fn what_is_not_read_is_refused_with_the_mend() {
     refused("ros1.bag", LogErrorKind::UnknownContainer, "rosbags-convert");
-    refused("no_effort.mcap", LogErrorKind::MissingJoint, "effort");
+    refused("no_effort.mcap", LogErrorKind::MissingJoint, "needs the torque");
+    let options = ReadOptions { topics: vec!["/other".into()], ..ReadOptions::default() };
+    let error = read_with("zstd.mcap", &options).unwrap_err().to_string();
+    assert!(error.contains("/other") && error.contains("/joint_states"), "{error}");
+    if cfg!(feature = "parquet") {
+        refused("lerobot_v30/data/chunk-000/file-000.parquet", LogErrorKind::MissingColumn, "folder");
+    }
 }
 
 #[test]

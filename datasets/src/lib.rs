@@ -35,7 +35,7 @@ pub use column_map::{ColumnMap, Source};
 pub use episode::{Channel, Episode, Samples};
 pub use error::{LogError, LogErrorKind};
 pub use generate::{GenerateError, Recipe, Robot, follow, generate, record};
-pub use perturb::Perturbation;
+pub use perturb::{Perturbation, other_body};
 pub use read::{ReadOptions, read_logs};
 pub use reference::{Excitation, Reference, ReferenceError, ReferenceKind, excitation};
 pub use resample::{Uniform, derive_velocity, resample};

@@ -16,6 +16,7 @@ mod robot;
 mod score;
 mod statistics;
 mod truth;
+mod used;
 mod visibility;
 
 pub use answer::{Answer, Named};
@@ -27,4 +28,4 @@ pub use outside::Outside;
 pub use plan::Plan;
 pub use robot::Robot;
 pub use score::{BankTotals, CaseScore, GroupTotals, SCORE_SCHEMA, Score, Totals};
-pub use truth::{DETECTABLE, Group, SealedEffect, Truth, is_unknown};
+pub use truth::{DETECTABLE, Group, Part, SealedEffect, Truth, Used, is_unknown};

@@ -210,7 +210,7 @@ impl Logs<'_> {
     fn held_out(&self, problem: &Problem, set: &[usize]) -> Result<HeldOut, EffectError> {
         let rows = self.held_out_rows(problem, set)?;
         let fits = Fit::without_folds(problem, set);
-        let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
+        let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.bodies(problem, self.model)).collect();
         let side = problem.side(set);
         let mut steps = true;
         for effects in &effects {
@@ -229,7 +229,7 @@ impl Logs<'_> {
     /// The residuals alone.
     fn held_out_rows(&self, problem: &Problem, set: &[usize]) -> Result<Rows, EffectError> {
         let fits = Fit::without_folds(problem, set);
-        let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
+        let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.bodies(problem, self.model)).collect();
         let side = problem.side(set);
         let in_fold = |i: usize, fold: usize| self.band.rows[i].fold == fold;
         let runs: Vec<(usize, usize)> = (0..self.signals.len())
@@ -327,7 +327,7 @@ impl Logs<'_> {
         let model = self.model;
         let weights = gap::weights(&self.signals, &self.moving);
         let (problem, fit) = (&chosen.exact, &chosen.fit);
-        let effects = fit.effects(problem, model);
+        let effects = fit.bodies(problem, model);
         let side = problem.side(&fit.set);
         progress("held-out rollouts", 0.7);
         let before = self.nominal();

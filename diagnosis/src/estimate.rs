@@ -6,7 +6,7 @@ use crate::problem::Problem;
 use crate::schema::{Estimate, Parameter, Quantity};
 use crate::signals::Signals;
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::{Candidate, Effect, Kind, Value, keep_bodies};
+use gapscope_effects::{Candidate, Effect, Kind, Plant, Value, keep_bodies};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -87,10 +87,20 @@ impl Fit {
             .unzip()
     }
 
-    /// The effects, one a kind where the kind has a value per joint. Candidates whose coefficients no physical effect has are left out.
+    /// The effects, one a kind where the kind has a value per joint. Candidates whose coefficients no physical effect has are
+    /// left out. Links may be what no body is: where a search moves on from here, a body that was moved would lead it astray.
     pub fn effects(&self, problem: &Problem, model: &Model) -> Vec<Effect> {
         let mut effects: Vec<Effect> =
             self.effects_with_candidates(problem, model).into_iter().map(|(effect, _)| effect).collect();
+        if Plant::new(model, &effects, 1e-3).is_err() {
+            keep_bodies(model, &mut effects);
+        }
+        effects
+    }
+
+    /// The same with every link a body.
+    pub fn bodies(&self, problem: &Problem, model: &Model) -> Vec<Effect> {
+        let mut effects = self.effects(problem, model);
         keep_bodies(model, &mut effects);
         effects
     }

@@ -147,6 +147,15 @@ impl ColumnMap {
         Some((Source { column: pattern.column.replace("{joint}", joint), scale: pattern.scale }, false))
     }
 
+    /// Whether it takes a quantity from this column.
+    pub(crate) fn takes(&self, column: &str) -> bool {
+        let fits = |pattern: &Source| match pattern.column.split_once("{joint}") {
+            Some((start, end)) => column.starts_with(start) && column.ends_with(end),
+            None => column == pattern.column,
+        };
+        self.joints.values().chain(&self.time).any(|source| source.column == column) || self.patterns.values().any(fits)
+    }
+
     pub(crate) fn ignores(&self, column: &str) -> bool {
         self.ignore.iter().any(|ignored| match ignored.strip_suffix('*') {
             Some(start) => column.starts_with(start),

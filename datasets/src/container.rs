@@ -13,7 +13,7 @@ pub(crate) struct Contents {
 }
 
 /// First bytes of files that are something else.
-const OTHERS: [(&[u8], &str); 10] = [
+const OTHERS: [(&[u8], &str); 11] = [
     (b"PAR1", "a Parquet file"),
     (b"\x89MCAP0", "an MCAP file"),
     (b"PK\x03\x04", "a zip archive (npz, xlsx)"),
@@ -24,28 +24,81 @@ const OTHERS: [(&[u8], &str); 10] = [
     (b"MATLAB 5.0", "a MATLAB file"),
     (b"\x28\xb5\x2f\xfd", "zstd-compressed"),
     (b"BZh", "bzip2-compressed"),
+    (b"\xfd7zXZ", "xz-compressed"),
 ];
+
+/// Most bytes of a log's text: seven joints for two hours at 1 kHz, with every channel.
+const MOST_BYTES: u64 = 1 << 32;
+/// A text of which the first so many bytes hold no line end is no log.
+const LONGEST_LINE: usize = 1 << 20;
 
 /// Reads a file whole and unpacks it where it is gzipped. Errors do not carry the file's name yet.
 pub(crate) fn read(path: &Path) -> Result<Contents, LogError> {
     if path.is_dir() {
         return Err(LogError::new(LogErrorKind::CannotRead, "this is a folder").hint("Name the log files in it"));
     }
-    let bytes = std::fs::read(path).map_err(|error| {
+    let cannot = |error: std::io::Error| {
         let hint = if error.kind() == std::io::ErrorKind::NotFound { "Check the path" } else { "" };
         LogError::new(LogErrorKind::CannotRead, format!("the file cannot be read: {error}")).hint(hint)
-    })?;
+    };
+    let mut file = std::fs::File::open(path).map_err(cannot)?;
+    let mut bytes = Vec::new();
+    file.by_ref().take(2).read_to_end(&mut bytes).map_err(cannot)?;
+    if bytes != GZIP {
+        read_text(&mut file, &mut bytes).map_err(|stop| stop.error(cannot))?;
+    } else {
+        file.read_to_end(&mut bytes).map_err(cannot)?;
+    }
     unpack(bytes)
+}
+
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// Why reading a text stopped.
+enum Stop {
+    Io(std::io::Error),
+    Bad(LogError),
+}
+
+impl Stop {
+    fn error(self, of_io: impl Fn(std::io::Error) -> LogError) -> LogError {
+        match self {
+            Stop::Io(error) => of_io(error),
+            Stop::Bad(error) => error,
+        }
+    }
+}
+
+/// Reads a text to its end, unless it shows that it is no log: what never ends a line would fill all memory.
+fn read_text(source: &mut impl Read, text: &mut Vec<u8>) -> Result<(), Stop> {
+    source.by_ref().take(LONGEST_LINE as u64).read_to_end(text).map_err(Stop::Io)?;
+    if text.len() >= LONGEST_LINE && !text.iter().any(|byte| matches!(byte, b'\n' | b'\r')) {
+        return Err(Stop::Bad(
+            LogError::new(LogErrorKind::UnknownContainer, "the first megabyte has no line end: this is no log")
+                .hint("Give CSV with a header and one row for each sample"),
+        ));
+    }
+    source.by_ref().take(MOST_BYTES).read_to_end(text).map_err(Stop::Io)?;
+    if text.len() as u64 > MOST_BYTES {
+        return Err(Stop::Bad(
+            LogError::new(LogErrorKind::CannotRead, "the log's text is longer than 4 GiB")
+                .hint("Split it into shorter runs"),
+        ));
+    }
+    Ok(())
 }
 
 /// Unpacks the bytes of a file.
 pub(crate) fn unpack(bytes: Vec<u8>) -> Result<Contents, LogError> {
-    let mut contents = if bytes.starts_with(&[0x1f, 0x8b]) {
-        let mut text = Vec::with_capacity(bytes.len().saturating_mul(3));
-        match MultiGzDecoder::new(bytes.as_slice()).read_to_end(&mut text) {
-            Ok(_) => Contents { bytes: text, cut: false },
-            Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => Contents { bytes: text, cut: true },
-            Err(error) => {
+    let mut contents = if bytes.starts_with(&GZIP) {
+        let mut text = Vec::new();
+        match read_text(&mut MultiGzDecoder::new(bytes.as_slice()), &mut text) {
+            Ok(()) => Contents { bytes: text, cut: false },
+            Err(Stop::Bad(error)) => return Err(error),
+            Err(Stop::Io(error)) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
+                Contents { bytes: text, cut: true }
+            }
+            Err(Stop::Io(error)) => {
                 return Err(LogError::new(LogErrorKind::CannotRead, format!("the gzip data is damaged: {error}"))
                     .hint("Copy the file again from its source"));
             }
@@ -62,7 +115,7 @@ pub(crate) fn unpack(bytes: Vec<u8>) -> Result<Contents, LogError> {
     }
     if let Some((_, what)) = OTHERS.iter().find(|(magic, _)| contents.bytes.starts_with(magic)) {
         return Err(LogError::new(LogErrorKind::UnknownContainer, format!("this is {what}, not CSV"))
-            .hint("Export it as CSV or gzipped CSV"));
+            .hint("Unpack it first, or export it as CSV or gzipped CSV"));
     }
     if contents.bytes.starts_with(&[0xff, 0xfe]) || contents.bytes.starts_with(&[0xfe, 0xff]) {
         return Err(LogError::new(LogErrorKind::Encoding, "the text is UTF-16").row(1).hint("Save it as UTF-8"));

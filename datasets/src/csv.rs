@@ -4,17 +4,12 @@ use crate::container::Contents;
 use crate::episode::{Channel, Episode};
 use crate::error::{LogError, LogErrorKind};
 use crate::header::{Plan, plan};
-use crate::read::ReadOptions;
-use crate::rows::{Columns, Rows, line_at, shown, unreadable};
+use crate::joint_names;
+use crate::options::ReadOptions;
+use crate::rows::{ALLOW, Columns, Rows, line_at, shown, unreadable};
+use crate::table::Table;
+use crate::units;
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
-
-/// A file as read: one episode, gaps and all, and the line of the file at which each sample stands.
-#[derive(Debug)]
-pub(crate) struct Table {
-    pub episode: Episode,
-    pub rows: Vec<u32>,
-    pub notes: Vec<String>,
-}
 
 /// Reads a log's text. Errors do not carry the file's name yet.
 pub(crate) fn parse(contents: &Contents, joints: &[String], options: &ReadOptions) -> Result<Table, LogError> {
@@ -32,22 +27,43 @@ pub(crate) fn parse(contents: &Contents, joints: &[String], options: &ReadOption
         text = &text[..whole];
     }
     let (delimiter, mut reader) = open(text);
-    let header = header(&mut reader)?;
-    let plan = plan(&header, joints, &options.map).map_err(|error| separator_hint(error, &header, delimiter))?;
+    let mut header = header(&mut reader)?;
+    notes.extend(joint_names::matched(&mut header, joints, &options.map, false));
+    let mut plan = plan(&header, joints, &options.map).map_err(|error| separator_hint(error, &header, delimiter))?;
     notes.extend(plan.notes.iter().cloned());
+    // The row below the header is looked at by a reader of its own: it may be one of the samples.
+    let mut ahead = open(text).1;
+    let mut record = ByteRecord::new();
+    let second = (0..2).all(|_| ahead.read_byte_record(&mut record).unwrap_or(false));
+    if second && let Some(note) = units::take(&record, &header, &mut plan) {
+        notes.push(note);
+        let _ = reader.read_byte_record(&mut record);
+    }
     let mut columns = Rows::new(text, &plan, delimiter, options).read(&mut reader, &mut notes)?;
-    Ok(Table { rows: std::mem::take(&mut columns.lines), episode: assemble(columns, &plan, joints), notes })
+    Ok(Table {
+        label: String::new(),
+        rows: std::mem::take(&mut columns.lines),
+        episode: assemble(columns, &plan, joints),
+        notes,
+    })
 }
 
-pub(crate) const ALLOW: &str =
-    "Copy the file again, or say that logs may be truncated (--allow-truncated) to read up to there";
-
 fn open(text: &[u8]) -> (u8, Reader<&[u8]>) {
-    let end = text.iter().position(|&byte| byte == b'\n' || byte == b'\r').unwrap_or(text.len());
-    let count = |delimiter: u8| text[..end].iter().filter(|&&byte| byte == delimiter).count();
+    let mut lines = text.split(|&byte| byte == b'\n' || byte == b'\r').filter(|line| !line.is_empty());
+    let first = lines.next().unwrap_or_default();
+    let is_comment = |line: &[u8]| line.first() == Some(&b'#');
+    // Comments above the header; but `# time,position.j1` above numbers is one itself.
+    let header = if is_comment(first) { lines.find(|line| !is_comment(line)).unwrap_or_default() } else { first };
+    let numbers =
+        header.iter().any(u8::is_ascii_digit) && !header.iter().any(|byte| b"abcdfghijklmopqrstuvwxyz_".contains(byte));
+    let (header, comment) = if is_comment(first) && numbers { (first, None) } else { (header, Some(b'#')) };
+    let comment = comment.filter(|_| is_comment(first));
+    let count = |delimiter: u8| header.iter().filter(|&&byte| byte == delimiter).count();
     // Commas win a tie; a header without any of the three is one column.
     let delimiter = [b',', b';', b'\t'].into_iter().rev().max_by_key(|&delimiter| count(delimiter)).unwrap_or(b',');
-    (delimiter, ReaderBuilder::new().delimiter(delimiter).flexible(true).has_headers(false).from_reader(text))
+    let mut builder = ReaderBuilder::new();
+    builder.delimiter(delimiter).flexible(true).has_headers(false).comment(comment);
+    (delimiter, builder.from_reader(text))
 }
 
 fn header(reader: &mut Reader<&[u8]>) -> Result<Vec<String>, LogError> {

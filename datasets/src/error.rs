@@ -48,7 +48,7 @@ pub struct LogError {
     /// Which rule.
     pub kind: LogErrorKind,
     /// File, as the caller named it; empty where no file is concerned.
-    pub file: String,
+    pub file: Box<str>,
     /// Line of the file, the header being line 1.
     pub row: Option<usize>,
     /// Name of the column in the file, or of the quantity that is missing.
@@ -56,16 +56,27 @@ pub struct LogError {
     /// What was found, in plain words.
     pub found: String,
     /// What mends it; empty where there is nothing to say.
-    pub hint: String,
+    pub hint: Box<str>,
+    /// Joints of the robot of which the log says nothing at all, while it names no joint that is not the robot's: those
+    /// that may be held still. Empty for all other errors.
+    pub absent: Box<[String]>,
 }
 
 impl LogError {
     pub(crate) fn new(kind: LogErrorKind, found: impl Into<String>) -> Self {
-        Self { kind, file: String::new(), row: None, column: None, found: found.into(), hint: String::new() }
+        Self {
+            kind,
+            file: Box::default(),
+            row: None,
+            column: None,
+            found: found.into(),
+            hint: Box::default(),
+            absent: Box::default(),
+        }
     }
 
     pub(crate) fn file(mut self, file: impl Into<String>) -> Self {
-        self.file = file.into();
+        self.file = file.into().into();
         self
     }
 
@@ -80,14 +91,14 @@ impl LogError {
     }
 
     pub(crate) fn hint(mut self, hint: impl Into<String>) -> Self {
-        self.hint = hint.into();
+        self.hint = hint.into().into();
         self
     }
 
     fn line(&self) -> String {
         let mut place = Vec::new();
         if !self.file.is_empty() {
-            place.push(self.file.clone());
+            place.push(self.file.to_string());
         }
         if let Some(row) = self.row {
             place.push(format!("row {row}"));

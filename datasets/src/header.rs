@@ -1,5 +1,6 @@
 //! Which column of a file feeds which quantity: the header against the robot's joints and the column map.
 
+use crate::channel_names;
 use crate::column_map::ColumnMap;
 use crate::episode::Channel;
 use crate::error::{LogError, LogErrorKind};
@@ -122,6 +123,14 @@ impl Header<'_> {
         }
         if let Some(index) = self.find("time")? {
             return Ok(Feed { index, column: "time".to_owned(), scale: 1.0, channel: None });
+        }
+        // A name that says the unit leaves nothing to guess: `time_ms`, `timestamp [ns]`.
+        for column in self.columns {
+            if let Some(Some(scale)) = channel_names::time_unit(column)
+                && let Some(index) = self.find(column)?
+            {
+                return Ok(Feed { index, column: column.clone(), scale, channel: None });
+            }
         }
         let missing = LogError::new(LogErrorKind::MissingColumn, "the log has no such column").row(1).column("time");
         let looks_like_time = |column: &&String| {
@@ -246,6 +255,7 @@ impl Header<'_> {
             LogError::new(LogErrorKind::MissingJoint, format!("no column feeds the {name} of {}", list(&names, 8)))
                 .row(1)
                 .column(&target);
+        let error = LogError { absent: self.absent(channel, &names).into(), ..error };
         let near: Vec<String> = self.near(joint).into_iter().filter(|column| !native(&column)).collect();
         let foreign: Vec<String> = self
             .columns
@@ -257,9 +267,28 @@ impl Header<'_> {
             format!("If one of {} holds it: --map \"{target}={}\"", list(&near, 3), near[0])
         } else if !foreign.is_empty() {
             format!("If one of {} holds it: --map \"{target}=<that column>\"", list(&foreign, 6))
+        } else if channel == Channel::Effort && missing.len() == self.joints.len() {
+            "A diagnosis needs the torque of the drives in N m: record it, or map the motor current to it with the torque constant as its scale"
+                .to_owned()
         } else {
-            "Log every joint of the URDF, or make joints that do not move `fixed` in the URDF".to_owned()
+            "Log every joint of the robot, or hold those that do not move: --lock".to_owned()
         })
+    }
+
+    /// The joints of `missing`, where the log names no joint but some of the robot's: a gripper that was not logged.
+    fn absent(&self, channel: Channel, missing: &[String]) -> Vec<String> {
+        let named: BTreeSet<&str> = self
+            .columns
+            .iter()
+            .filter(|column| !self.map.ignores(column))
+            .filter_map(|column| column.split_once('.'))
+            .filter(|(channel, _)| Channel::from_name(channel).is_some())
+            .map(|(_, joint)| joint)
+            .collect();
+        let known = |joint: &str| self.joints.iter().any(|known| known == joint);
+        let silent = missing.iter().all(|joint| !named.contains(joint.as_str()));
+        let sound = !named.is_empty() && named.iter().all(|joint| known(joint));
+        if channel == Channel::Position && sound && silent { missing.to_vec() } else { Vec::new() }
     }
 
     /// Native columns of joints that the robot lacks.

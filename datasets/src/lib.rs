@@ -6,37 +6,50 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod arrays;
+mod calibration;
+mod channel_names;
 mod check;
 mod column_map;
 mod container;
 mod csv;
 mod episode;
 mod error;
+mod formats;
 mod generate;
 mod header;
 mod interpolate;
+mod joint_names;
 mod mend;
+mod options;
 mod perturb;
+mod range;
 mod read;
+mod recording;
 mod reference;
 mod resample;
 mod robust;
+mod ros;
 mod rows;
 mod scale;
 mod sensors;
 mod servo;
+mod table;
 mod time_stamps;
 mod trajectory;
 mod transitions;
+mod units;
 mod write;
 
+pub use calibration::Calibration;
 pub use check::check_logs;
 pub use column_map::{ColumnMap, Source};
 pub use episode::{Channel, Episode, Samples};
 pub use error::{LogError, LogErrorKind};
 pub use generate::{GenerateError, Recipe, Robot, follow, generate, record};
+pub use options::ReadOptions;
 pub use perturb::Perturbation;
-pub use read::{ReadOptions, read_logs};
+pub use read::read_logs;
 pub use reference::{Excitation, Reference, ReferenceError, ReferenceKind, excitation};
 pub use resample::{Uniform, derive_velocity, resample};
 pub use sensors::Sensors;

@@ -1,29 +1,15 @@
 //! A set of log files in.
 
-use crate::column_map::ColumnMap;
-use crate::container;
-use crate::csv;
 use crate::episode::Episode;
 use crate::error::{LogError, LogErrorKind};
+use crate::formats::{self, Request};
+use crate::options::ReadOptions;
+use crate::table::Table;
 use crate::time_stamps;
 use gapscope_dynamics::Finding;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// How logs are read. The default is strict, for files with the native names.
-#[derive(Debug, Clone, Default)]
-pub struct ReadOptions {
-    /// Which columns feed which quantities, where they do not carry the native names.
-    pub map: ColumnMap,
-    /// Read a file that ends in the middle of a row, or of its compressed data, up to its last whole row.
-    pub allow_truncated: bool,
-    /// Leave out files that cannot be read, with a finding, as long as one can.
-    pub skip_bad_files: bool,
-    /// Where a cell of `velocity`, `command`, `effort_link` or `temperature` holds no number, leave the channel out for
-    /// that file, with a finding, instead of failing.
-    pub drop_bad_channels: bool,
-}
 
 /// Reads log files, CSV or gzipped CSV, into episodes, in the order of `paths`.
 ///
@@ -48,38 +34,28 @@ pub fn read_logs(
             .hint("Check the joint types in the URDF"));
     }
     let names = names(&paths);
-    let files: Vec<(&&Path, &String)> = paths.iter().zip(&names).collect();
-    let tables: Vec<Result<csv::Table, LogError>> =
-        files.par_iter().map(|(path, _)| read_table(path, joints, options)).collect();
+    let request = Request { joints, options };
+    let files: Vec<(&Path, &String)> = paths.iter().copied().zip(&names).collect();
 
     let mut episodes: Vec<Episode> = Vec::new();
     let mut first_error = None;
     let mut good = 0;
-    for (name, table) in names.iter().zip(tables) {
-        match table {
-            Ok(table) => {
-                good += 1;
-                let (parts, notes) = time_stamps::split(table, name);
-                findings.extend(notes.into_iter().map(|note| Finding::new(name, note)));
-                for part in parts {
-                    match episodes.iter().find(|earlier| earlier.time == part.time && earlier.position == part.position)
-                    {
-                        Some(earlier) => findings.push(Finding::new(
-                            &part.name,
-                            format!(
-                                "holds the same samples as {}: left out, for it would be held out against itself",
-                                earlier.name
-                            ),
-                        )),
-                        None => episodes.push(part),
-                    }
+    // A few files at a time: what is not taken over yet stays small beside what is.
+    for files in files.chunks(2 * rayon::current_num_threads()) {
+        let read: Vec<_> = files.par_iter().map(|(path, name)| (name, read_file(path, name, &request))).collect();
+        for (name, file) in read {
+            match file {
+                Ok((parts, notes)) => {
+                    good += 1;
+                    findings.extend(notes);
+                    parts.into_iter().for_each(|part| add(part, &mut episodes, &mut findings));
                 }
+                Err(error) if options.skip_bad_files => {
+                    findings.push(Finding::new(name.as_str(), format!("left out: {error}")));
+                    first_error.get_or_insert(error);
+                }
+                Err(error) => return Err(error),
             }
-            Err(error) if options.skip_bad_files => {
-                findings.push(Finding::new(name, format!("left out: {error}")));
-                first_error.get_or_insert(error);
-            }
-            Err(error) => return Err(error),
         }
     }
     match first_error {
@@ -88,10 +64,30 @@ pub fn read_logs(
     }
 }
 
-fn read_table(path: &Path, joints: &[String], options: &ReadOptions) -> Result<csv::Table, LogError> {
-    container::read(path)
-        .and_then(|contents| csv::parse(&contents, joints, options))
-        .map_err(|error| error.file(path.display().to_string()))
+/// The episodes of one file, and what there is to say about it.
+fn read_file(path: &Path, name: &str, request: &Request) -> Result<(Vec<Episode>, Vec<Finding>), LogError> {
+    let (mut episodes, mut findings) = (Vec::new(), Vec::new());
+    let mut take = |table: Table| {
+        let name = format!("{name}{}", table.label);
+        let (parts, notes) = time_stamps::split(table, &name);
+        findings.extend(notes.into_iter().map(|note| Finding::new(&name, note)));
+        episodes.extend(parts);
+    };
+    formats::open(path)
+        .and_then(|reader| reader.runs(request, &mut take))
+        .map_err(|error| if error.file.is_empty() { error.file(path.display().to_string()) } else { error })?;
+    Ok((episodes, findings))
+}
+
+/// Takes an episode in, unless the same samples are there already.
+fn add(part: Episode, episodes: &mut Vec<Episode>, findings: &mut Vec<Finding>) {
+    match episodes.iter().find(|earlier| earlier.time == part.time && earlier.position == part.position) {
+        Some(earlier) => findings.push(Finding::new(
+            &part.name,
+            format!("holds the same samples as {}: left out, for it would be held out against itself", earlier.name),
+        )),
+        None => episodes.push(part),
+    }
 }
 
 /// The paths without those that were given before.

@@ -1,12 +1,15 @@
 //! The rows of a log's text, as numbers.
 
-use crate::csv::ALLOW;
 use crate::episode::Channel;
 use crate::error::{LogError, LogErrorKind};
 use crate::header::{Feed, Plan};
-use crate::read::ReadOptions;
+use crate::options::ReadOptions;
 use ::csv::{ByteRecord, Reader};
 use std::borrow::Cow;
+
+/// What mends a file that ends early.
+pub(crate) const ALLOW: &str =
+    "Copy the file again, or say that logs may be truncated (--allow-truncated) to read up to there";
 
 /// All rows of a log's text, by the feeds of its plan.
 pub(crate) struct Rows<'a> {
@@ -118,7 +121,9 @@ impl<'a> Rows<'a> {
         numbers: &mut [f64],
         spare: &mut dyn FnMut(&Feed, Channel, &LogError),
     ) -> Result<(), Fault> {
-        if record.len() != self.plan.width {
+        // A comma at the end of each row makes one empty cell more.
+        let closed = record.len() == self.plan.width + 1 && record.get(self.plan.width).is_some_and(<[u8]>::is_empty);
+        if record.len() != self.plan.width && !closed {
             let mut found = format!("the row has {} cells, the header {}", record.len(), self.plan.width);
             if record.iter().any(|cell| cell.contains(&b'\n')) {
                 found.push_str("; a quotation mark is not closed");
@@ -153,7 +158,10 @@ impl<'a> Rows<'a> {
 
     fn number(&self, cell: &[u8], feed: &Feed) -> Result<f64, LogError> {
         let cell = cell.trim_ascii();
-        let parsed = std::str::from_utf8(cell).ok().and_then(|text| text.parse::<f64>().ok());
+        let text = std::str::from_utf8(cell).ok();
+        // Where commas do not part cells, one in a number is its decimal mark.
+        let comma = |text: &str| text.replace(',', ".").parse().ok().filter(|_| self.delimiter != b',');
+        let parsed = text.and_then(|text| text.parse::<f64>().ok().or_else(|| comma(text)));
         if let Some(number) = parsed {
             let scaled = if feed.scale == 1.0 { number } else { number * feed.scale };
             if scaled.is_finite() {

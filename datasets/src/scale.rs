@@ -1,6 +1,6 @@
 //! What is much and what is little for a joint.
 
-use crate::reference::range;
+use crate::range::range;
 use gapscope_dynamics::{Data, Model};
 use nalgebra::DMatrix;
 

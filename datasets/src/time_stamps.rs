@@ -1,8 +1,8 @@
 //! Time stamps of a log: gaps, at which it is split, and jitter.
 
-use crate::csv::Table;
 use crate::episode::Episode;
 use crate::robust::{median, quantile};
+use crate::table::Table;
 
 /// A step of time is a gap from this many median steps on …
 const GAP_STEPS: f64 = 5.0;
@@ -15,7 +15,7 @@ const JITTER: f64 = 0.05;
 
 /// Splits a table at its gaps. Returns the parts that are long enough and what there is to say about the file's time.
 pub(crate) fn split(table: Table, name: &str) -> (Vec<Episode>, Vec<String>) {
-    let Table { episode, rows, mut notes } = table;
+    let Table { episode, rows, mut notes, .. } = table;
     let steps: Vec<f64> = episode.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let dt = median(&mut steps.clone()).unwrap_or(0.0);
     let is_gap = |step: f64| step > GAP_STEPS * dt && step > GAP_SECONDS;
@@ -109,7 +109,7 @@ mod tests {
         let zeros = vec![vec![0.0; time.len()]];
         let episode =
             Episode { joints: vec!["a".into()], position: zeros.clone(), effort: zeros, time, ..Episode::default() };
-        Table { episode, rows, notes: Vec::new() }
+        Table { label: String::new(), episode, rows, notes: Vec::new() }
     }
 
     fn even(count: usize, from: f64) -> Vec<f64> {

@@ -47,11 +47,11 @@ pub enum Withheld {
 }
 
 /// Which robot and logs.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct Input {
-    /// Robot description (URDF)
+    /// Robot description: URDF, xacro or MJCF
     pub robot: PathBuf,
-    /// Logs, one file an episode (CSV, also gzipped; see `--map` for other column names)
+    /// Logs: CSV, NumPy, MATLAB, Parquet, HDF5, MCAP, folders of ROS 2 bags and of LeRobot datasets
     #[arg(required = true)]
     pub logs: Vec<PathBuf>,
     /// Read a column of another name, e.g. `position.joint1=/joint_states/j1/pos`; may be given several times
@@ -60,7 +60,19 @@ pub struct Input {
     /// Read column names from a TOML file
     #[arg(long, value_name = "FILE")]
     pub map_file: Option<PathBuf>,
-    /// Hold a joint of the URDF fixed at zero, e.g. a gripper that is not in the logs; may be given several times
+    /// Read this topic of a bag, instead of the one that is chosen; may be given several times
+    #[arg(long = "topic", value_name = "TOPIC")]
+    pub topic: Vec<String>,
+    /// Read these episodes of a dataset, e.g. `3` or `0-9,20`
+    #[arg(long, value_name = "RANGES")]
+    pub episodes: Option<String>,
+    /// Read positions of a LeRobot dataset as per cent of the ranges in this calibration file
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
+    /// Pass an argument to xacro, where the robot description is a xacro file; may be given several times
+    #[arg(long = "xacro-arg", value_name = "NAME:=VALUE")]
+    pub xacro_args: Vec<String>,
+    /// Hold a joint of the robot fixed at zero; joints of which the logs say nothing are held by themselves
     #[arg(long = "lock", value_name = "JOINT")]
     pub lock: Vec<String>,
     /// Read a log that ends in the middle of a row up to its last whole row

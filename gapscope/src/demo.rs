@@ -50,15 +50,7 @@ pub fn run(args: &Demo) -> Result<String> {
         logs.push(path);
     }
     // From here on only the files count: the diagnosis reads what a user's robot would have left.
-    let input = Input {
-        robot: urdf.clone(),
-        logs: logs.clone(),
-        map: vec![],
-        map_file: None,
-        lock: vec![],
-        allow_truncated: false,
-        skip_bad_logs: false,
-    };
+    let input = Input { robot: urdf.clone(), logs: logs.clone(), ..Input::default() };
     let mut outcome = with_progress(load(&input)?)?;
     outcome.evidence.robot_file = urdf.display().to_string();
     outcome.evidence.logs = logs.iter().map(|l| l.display().to_string()).collect();

@@ -273,11 +273,7 @@ mod tests {
         let input = crate::cli::Input {
             robot: out.join("robot.urdf"),
             logs: vec![out.join("episode_0.csv"), out.join("episode_1.csv")],
-            map: vec![],
-            map_file: None,
-            lock: vec![],
-            allow_truncated: false,
-            skip_bad_logs: false,
+            ..crate::cli::Input::default()
         };
         let loaded = crate::input::load(&input).unwrap();
         assert_eq!((loaded.episodes.len(), loaded.episodes[0].len()), (2, 600));

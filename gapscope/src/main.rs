@@ -11,6 +11,7 @@ mod learned;
 mod output;
 mod picture;
 mod report;
+mod robot;
 mod rollout;
 mod study;
 mod summary;

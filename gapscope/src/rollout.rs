@@ -196,11 +196,7 @@ mod tests {
             input: Input {
                 robot: dir.path().join("robot.urdf"),
                 logs: vec![dir.path().join("log.csv")],
-                map: vec![],
-                map_file: None,
-                lock: vec![],
-                allow_truncated: false,
-                skip_bad_logs: false,
+                ..Input::default()
             },
             with: None,
             residual: None,

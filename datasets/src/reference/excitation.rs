@@ -1,8 +1,9 @@
 //! How well a motion tells the parameters of a robot, and a motion made for that.
 
 use super::fourier::Fourier;
-use super::limits::{self, Range};
+use super::limits;
 use super::{Reference, ReferenceError, Shape};
+use crate::range::Range;
 use crate::scale::greatest_effort;
 use gapscope_dynamics::{BaseParameters, Data, Model, base_parameters};
 use nalgebra::DMatrix;

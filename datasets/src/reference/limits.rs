@@ -1,24 +1,15 @@
 //! Limits of a robot: where a motion may go, how fast, and with which effort.
 
 use super::Reference;
-use gapscope_dynamics::{Data, JointKind, Model};
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64;
+use crate::range::{PART, effort_for_motion};
+use gapscope_dynamics::{Data, Model};
 
-/// Part of a joint's range, speed and effort that a motion may use.
-const PART: f64 = 0.8;
-/// Amplitude where the URDF gives no range, rad or m.
-const AMPLITUDE: f64 = 1.0;
-/// Most amplitude on a rotating and on a sliding joint, rad and m.
-const AMPLITUDE_AT_MOST: [f64; 2] = [1.2, 0.3];
 /// Spacing of the points at which limits are checked, s at rate one: 25 to a period of the fastest chirp.
 const SPACING: f64 = 0.02;
 /// A motion that limits slow down to less than this part of its pace is made smaller instead.
 const SLOWEST: f64 = 0.3;
 /// By which factor, and how often at most: down to two hundredths of the range.
 const SHRINK: (f64, usize) = (0.75, 14);
-/// Part of an effort limit that holding the middle posture may use before another middle is sought.
-const HOLD: f64 = 0.5;
 
 /// Why there is no motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -52,70 +43,6 @@ pub(super) fn check(name: &'static str, value: f64) -> Result<(), ReferenceError
     if value > 0.0 && value.is_finite() { Ok(()) } else { Err(ReferenceError::NotPositive { name, value }) }
 }
 
-/// Posture around which a motion runs, and how far it may go from there, per joint.
-pub(crate) struct Range {
-    pub(crate) middle: Vec<f64>,
-    pub(crate) amplitude: Vec<f64>,
-}
-
-/// The middle of the joints' ranges, or a posture near it in which the robot is held with less effort where that one takes
-/// much of what the drives have.
-pub(crate) fn range(model: &Model) -> Range {
-    let n = model.dof();
-    let bounds: Vec<(f64, f64)> = (0..n).map(|j| bounds(model, j)).collect();
-    let posture = |part: &mut dyn FnMut() -> f64| -> Vec<f64> {
-        bounds.iter().map(|(low, high)| 0.5 * (low + high) + 0.5 * part() * (high - low)).collect()
-    };
-    let mut data = Data::new(model);
-    let mut hold = vec![0.0; n];
-    let mut strain = |q: &[f64]| {
-        model.gravity_torque(&mut data, q, &mut hold);
-        (0..n).map(|j| (hold[j].abs() + model.joints()[j].friction) / effort(model, j)).fold(0.0, f64::max)
-    };
-    let mut middle = posture(&mut || 0.0);
-    let mut least = strain(&middle);
-    if least > HOLD {
-        let mut random = Pcg64::seed_from_u64(0);
-        for _ in 0..500 {
-            let other = posture(&mut || random.random_range(-0.6..0.6));
-            let needed = strain(&other);
-            if needed < least {
-                (middle, least) = (other, needed);
-            }
-        }
-    }
-    let amplitude = (0..n)
-        .map(|j| {
-            let (low, high) = bounds[j];
-            let most = AMPLITUDE_AT_MOST[usize::from(model.joints()[j].kind == JointKind::Prismatic)];
-            (middle[j] - low).min(high - middle[j]).min(most).max(0.0)
-        })
-        .collect();
-    Range { middle, amplitude }
-}
-
-/// The part of a joint's range that a motion may use.
-fn bounds(model: &Model, j: usize) -> (f64, f64) {
-    let joint = &model.joints()[j];
-    let finite = |x: &f64| x.is_finite();
-    let (lower, upper) = (joint.limits.lower.filter(finite), joint.limits.upper.filter(finite));
-    match (lower, upper) {
-        _ if joint.kind == JointKind::Continuous => (-2.0 * AMPLITUDE, 2.0 * AMPLITUDE),
-        (Some(low), Some(high)) => {
-            let (middle, reach) = (0.5 * (low + high), 0.5 * PART * (high - low).max(0.0));
-            (middle - reach, middle + reach)
-        }
-        (Some(low), None) => (low + 0.2 * AMPLITUDE, low + 2.2 * AMPLITUDE),
-        (None, Some(high)) => (high - 2.2 * AMPLITUDE, high - 0.2 * AMPLITUDE),
-        (None, None) => (-AMPLITUDE, AMPLITUDE),
-    }
-}
-
-/// The effort that a motion may use, N m or N; a URDF's 0 is no limit but a missing one.
-fn effort(model: &Model, j: usize) -> f64 {
-    PART * model.joints()[j].limits.effort.filter(|&limit| limit > 0.0).unwrap_or(f64::INFINITY)
-}
-
 fn velocity(model: &Model, j: usize) -> f64 {
     PART * model.joints()[j].limits.velocity.filter(|&limit| limit > 0.0).unwrap_or(f64::INFINITY)
 }
@@ -145,7 +72,7 @@ pub(super) fn keep(model: &Model, mut motion: Reference, seconds: f64) -> Result
     let joint = &model.joints()[tightest];
     Err(ReferenceError::NoRoom {
         joint: joint.name.clone(),
-        effort: effort(model, tightest) / PART,
+        effort: effort_for_motion(model, tightest) / PART,
         velocity: velocity(model, tightest) / PART,
         hold: hold[tightest].abs() + joint.friction,
     })
@@ -164,8 +91,11 @@ fn greatest_pace(model: &Model, motion: &Reference, seconds: f64) -> (f64, usize
         model.inverse_dynamics(&mut data, &q, &v, &a, &mut torque);
         for (j, joint) in model.joints().iter().enumerate() {
             let inertial = torque[j] - gravity[j];
-            let room = effort(model, j) - joint.friction - joint.damping * v[j].abs() - gravity[j] * inertial.signum();
-            let held = effort(model, j) - joint.friction - gravity[j].abs();
+            let room = effort_for_motion(model, j)
+                - joint.friction
+                - joint.damping * v[j].abs()
+                - gravity[j] * inertial.signum();
+            let held = effort_for_motion(model, j) - joint.friction - gravity[j].abs();
             let by_effort = if held < 0.0 { 0.0 } else { (room.max(0.0) / inertial.abs()).sqrt() };
             let allowed = by_effort.min(velocity(model, j) / v[j].abs());
             if allowed < pace {

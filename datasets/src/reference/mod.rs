@@ -10,12 +10,11 @@ mod sweep;
 pub use excitation::{Excitation, excitation};
 pub use limits::ReferenceError;
 
+use crate::range::{Range, range};
 use crate::trajectory::Trajectory;
 use chirp::Chirp;
 use fourier::Fourier;
 use gapscope_dynamics::Model;
-use limits::Range;
-pub(crate) use limits::range;
 use point_to_point::PointToPoint;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
@@ -96,7 +95,7 @@ impl Reference {
         limits::check("seconds", seconds)?;
         limits::check("speed", speed)?;
         let mut random = Pcg64::seed_from_u64(seed);
-        let mut range = limits::range(model);
+        let mut range = range(model);
         range.amplitude.iter_mut().zip(parts).for_each(|(amplitude, part)| *amplitude *= part);
         if kind == ReferenceKind::Optimised {
             return excitation::optimised(model, &range, seed, speed, seconds);

@@ -49,6 +49,7 @@ fn options(kind: u8) -> ReadOptions {
         allow_truncated: kind & 1 > 0,
         skip_bad_files: kind & 2 > 0,
         drop_bad_channels: kind & 8 > 0,
+        ..ReadOptions::default()
     }
 }
 

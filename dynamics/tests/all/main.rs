@@ -9,6 +9,7 @@ mod dormand_prince;
 mod golden;
 mod identities;
 mod lanes;
+mod mjcf;
 mod model;
 mod step;
 mod urdf_broken;

@@ -88,15 +88,7 @@ fn sets() -> String {
 }
 
 fn input(folder: &Path, log: &str) -> Input {
-    Input {
-        robot: folder.join("robot.urdf"),
-        logs: vec![folder.join(log)],
-        map: vec![],
-        map_file: None,
-        lock: vec![],
-        allow_truncated: false,
-        skip_bad_logs: false,
-    }
+    Input { robot: folder.join("robot.urdf"), logs: vec![folder.join(log)], ..Input::default() }
 }
 
 #[cfg(test)]

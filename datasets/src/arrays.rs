@@ -1,0 +1,220 @@
+//! Named arrays of a file (NumPy, MATLAB, HDF5) made a recording: which of them is the time, which a quantity of all
+//! joints.
+
+use crate::channel_names;
+use crate::episode::Channel;
+use crate::error::{LogError, LogErrorKind};
+use crate::formats::Request;
+use crate::joint_names::UNNAMED;
+use crate::recording::Recording;
+
+/// Most numbers that one array may hold: a day at 1 kHz of one quantity of 20 joints is 1.7e9, an hour 7.2e7.
+pub(crate) const MOST_NUMBERS: u64 = 1 << 28;
+
+/// An array of numbers, or of texts.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Array {
+    /// Its name; of one in a structure or group, with those of these before it and a dot between.
+    pub name: String,
+    /// Lengths along its axes.
+    pub shape: Vec<usize>,
+    /// Numbers, last axis fastest; empty where it holds texts.
+    pub values: Vec<f64>,
+    /// Texts; empty where it holds numbers.
+    pub texts: Vec<String>,
+}
+
+impl Array {
+    /// Numbers under a name.
+    pub fn numbers(name: impl Into<String>, shape: Vec<usize>, values: Vec<f64>) -> Self {
+        Self { name: name.into(), shape, values, texts: Vec::new() }
+    }
+
+    /// Texts under a name.
+    pub fn texts(name: impl Into<String>, texts: Vec<String>) -> Self {
+        Self { name: name.into(), shape: vec![texts.len()], values: Vec::new(), texts }
+    }
+
+    /// The last part of the name.
+    fn own_name(&self) -> &str {
+        self.name.rsplit('.').next().unwrap_or(&self.name)
+    }
+
+    /// The shape without axes of length one.
+    fn lengths(&self) -> Vec<usize> {
+        self.shape.iter().copied().filter(|&length| length != 1).collect()
+    }
+}
+
+/// The run that arrays of a file hold. Without a time, `rate` in Hz makes one.
+pub(crate) fn recording(arrays: &[Array], rate: Option<f64>, request: &Request) -> Result<Recording, LogError> {
+    let mut recording = Recording::default();
+    let count = samples(arrays, request)?;
+    let names = joint_names(arrays);
+    add_time(arrays, count, rate, request, &mut recording)?;
+    let mut channels = Vec::new();
+    let mut passed_over = Vec::new();
+    for array in arrays.iter().filter(|array| !array.values.is_empty()) {
+        let Some(columns) = columns(array, count) else {
+            passed_over.push(array);
+            continue;
+        };
+        // A map names columns as the file does.
+        if request.options.map.is_empty() && is_time(array) {
+            continue;
+        }
+        if !request.options.map.is_empty() {
+            for (at, values) in columns.iter().enumerate() {
+                let name = if columns.len() == 1 { array.name.clone() } else { format!("{}[{at}]", array.name) };
+                recording.add(name, values.clone());
+            }
+        }
+        let Some(channel) = channel_names::channel(array.own_name()).filter(|_| !is_time(array)) else {
+            continue;
+        };
+        if channels.contains(&channel) {
+            recording.notes.push(format!(
+                "`{}` is not read: another array is the {} already",
+                array.name,
+                channel.name()
+            ));
+            continue;
+        }
+        channels.push(channel);
+        for (at, values) in columns.into_iter().enumerate() {
+            let joint = match &names {
+                Some(names) if names.len() > at => names[at].clone(),
+                _ => format!("{UNNAMED}{}", at + 1),
+            };
+            recording.add(format!("{}.{joint}", channel.name()), values);
+        }
+    }
+    if names.is_none() && !channels.is_empty() {
+        recording.notes.push("the file does not name its joints: they are taken in the robot's order".to_owned());
+    }
+    require(&channels, arrays, request)?;
+    let names: Vec<&str> =
+        passed_over.iter().filter(|array| array.values.len() > 1).map(|array| array.name.as_str()).take(8).collect();
+    if !names.is_empty() {
+        recording.notes.push(format!("arrays that are not read: {}", names.join(", ")));
+    }
+    Ok(recording)
+}
+
+/// An error where the arrays that no log can do without are missing, and no map says where they are.
+fn require(channels: &[Channel], arrays: &[Array], request: &Request) -> Result<(), LogError> {
+    if !request.options.map.is_empty() {
+        return Ok(());
+    }
+    for needed in [Channel::Position, Channel::Effort] {
+        let by_link = needed == Channel::Effort && channels.contains(&Channel::EffortLink);
+        if !channels.contains(&needed) && !by_link {
+            let held: Vec<String> =
+                arrays.iter().take(12).map(|array| format!("{} {:?}", array.name, array.shape)).collect();
+            if arrays.iter().any(|array| array.name.starts_with("observation.")) {
+                return Err(LogError::new(LogErrorKind::MissingColumn, "this is a part of a LeRobot dataset")
+                    .hint("Give the dataset's folder, with meta/info.json in it; --episodes chooses"));
+            }
+            let joint = request.joints.first().map_or("joint1", String::as_str);
+            return Err(LogError::new(
+                LogErrorKind::MissingColumn,
+                format!("no array holds the {} of the joints; the file holds {}", needed.name(), held.join(", ")),
+            )
+            .hint(format!(
+                "Name it `{0}`, of shape samples × joints, or map its columns: --map \"{0}.{joint}=<array>[0]\"",
+                needed.name()
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn is_time(array: &Array) -> bool {
+    array.lengths().len() == 1 && channel_names::time_unit(array.own_name()).is_some()
+}
+
+/// The number of samples: that of the time, or else of the positions.
+fn samples(arrays: &[Array], request: &Request) -> Result<usize, LogError> {
+    if let Some(time) = arrays.iter().find(|array| is_time(array)) {
+        return Ok(time.values.len());
+    }
+    let of_position = arrays
+        .iter()
+        .find(|array| channel_names::channel(array.own_name()) == Some(Channel::Position) && !array.values.is_empty());
+    let length = match of_position.map(Array::lengths).as_deref() {
+        Some([samples]) => Some(*samples),
+        // Samples × joints, or joints × samples: there are more samples than joints.
+        Some([a, b]) => Some(if *a == request.joints.len() && b > a { *b } else { *a }),
+        _ => None,
+    };
+    length.ok_or_else(|| {
+        let names: Vec<&str> = arrays.iter().take(12).map(|array| array.name.as_str()).collect();
+        LogError::new(
+            LogErrorKind::MissingColumn,
+            format!("no array is the time or the positions of the joints; the file holds {}", names.join(", ")),
+        )
+        .hint("Name them `time`, of one number a sample, and `position`, of shape samples × joints")
+    })
+}
+
+/// The columns of an array with one number, or one row, a sample; joint by joint.
+fn columns(array: &Array, count: usize) -> Option<Vec<Vec<f64>>> {
+    let values = &array.values;
+    match array.lengths().as_slice() {
+        [samples] if *samples == count => Some(vec![values.clone()]),
+        [samples, width] if *samples == count => {
+            Some((0..*width).map(|j| values.iter().skip(j).step_by(*width).copied().collect()).collect())
+        }
+        [width, samples] if *samples == count => {
+            Some((0..*width).map(|j| values[j * samples..(j + 1) * samples].to_vec()).collect())
+        }
+        _ => None,
+    }
+}
+
+fn joint_names(arrays: &[Array]) -> Option<Vec<String>> {
+    let is_names = |array: &&Array| {
+        let name: String = array.own_name().chars().filter(|c| c.is_alphanumeric()).collect();
+        !array.texts.is_empty()
+            && ["jointnames", "names", "joints", "name", "joint"].contains(&name.to_lowercase().as_str())
+    };
+    arrays.iter().find(is_names).map(|array| array.texts.clone())
+}
+
+fn add_time(
+    arrays: &[Array],
+    count: usize,
+    rate: Option<f64>,
+    request: &Request,
+    recording: &mut Recording,
+) -> Result<(), LogError> {
+    if let Some(time) = arrays.iter().find(|array| is_time(array)) {
+        if request.options.map.is_empty() {
+            recording.add(time.own_name(), time.values.clone());
+        }
+        return Ok(());
+    }
+    if request.options.map.time().is_some() {
+        return Ok(());
+    }
+    let named = arrays.iter().filter(|array| array.values.len() == 1).find_map(|array| {
+        let value = array.values[0];
+        channel_names::is_rate(array.own_name()).map(|is_rate| (array, if is_rate { value } else { 1.0 / value }))
+    });
+    let (rate, why) = match (named, rate) {
+        (Some((array, rate)), _) => (rate, format!("from `{}`", array.name)),
+        (None, Some(rate)) => (rate, "which such files usually have".to_owned()),
+        (None, None) => {
+            return Err(LogError::new(LogErrorKind::MissingColumn, "no array holds the time")
+                .column("time")
+                .hint("Add an array `time` in seconds, or a number `rate` in Hz or `dt` in seconds"));
+        }
+    };
+    if !(rate.is_finite() && rate > 0.0) {
+        return Err(LogError::new(LogErrorKind::MissingColumn, format!("the sampling rate is {rate} Hz"))
+            .hint("A rate is a positive number; add an array `time` in seconds"));
+    }
+    recording.notes.push(format!("has no time: made from {rate} Hz, {why}"));
+    recording.add("time", (0..count).map(|sample| sample as f64 / rate).collect());
+    Ok(())
+}

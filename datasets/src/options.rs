@@ -1,0 +1,32 @@
+//! How logs are read.
+
+use crate::calibration::Calibration;
+use crate::column_map::ColumnMap;
+
+/// How logs are read. The default is strict, for files with the native names.
+#[derive(Debug, Clone, Default)]
+pub struct ReadOptions {
+    /// Which columns feed which quantities, where they do not carry the native names.
+    pub map: ColumnMap,
+    /// Topics of a bag that are read; empty for those that are chosen by what they hold.
+    pub topics: Vec<String>,
+    /// Ranges of episodes of a dataset that are read, both ends included; empty for all.
+    pub episodes: Vec<(u64, u64)>,
+    /// What a per cent of a motor's range is, for LeRobot datasets whose positions are that.
+    pub calibration: Option<Calibration>,
+    /// Read a file that ends in the middle of a row, or of its compressed data, up to its last whole row.
+    pub allow_truncated: bool,
+    /// Leave out files that cannot be read, with a finding, as long as one can.
+    pub skip_bad_files: bool,
+    /// Where a cell of `velocity`, `command`, `effort_link` or `temperature` holds no number, leave the channel out for
+    /// that file, with a finding, instead of failing.
+    pub drop_bad_channels: bool,
+}
+
+#[cfg(feature = "parquet")]
+impl ReadOptions {
+    /// Whether an episode of this number is to be read.
+    pub(crate) fn wants_episode(&self, number: u64) -> bool {
+        self.episodes.is_empty() || self.episodes.iter().any(|(first, last)| (*first..=*last).contains(&number))
+    }
+}

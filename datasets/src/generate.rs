@@ -10,7 +10,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-/// Physics steps per sample of the log.
+/// Physics steps per sample of the log, unless a recipe says otherwise.
 const SUBSTEPS: usize = 4;
 /// Most samples of an episode, so that a slip of the pen does not fill the memory.
 const SAMPLES_AT_MOST: f64 = 1e7;
@@ -25,6 +25,8 @@ pub struct Recipe {
     pub seconds: f64,
     /// Sampling and control rate, Hz.
     pub rate: f64,
+    /// Physics steps per sample, one at least.
+    pub substeps: usize,
     /// Family of the reference motion.
     pub motion: ReferenceKind,
     /// Pace of the motion; 1 is an ordinary one, and limits may slow it down.
@@ -42,6 +44,7 @@ impl Default for Recipe {
         Recipe {
             seconds: 10.0,
             rate: 500.0,
+            substeps: SUBSTEPS,
             motion: ReferenceKind::default(),
             speed: 1.0,
             servo: Servo::default(),
@@ -100,13 +103,16 @@ pub enum GenerateError {
 impl Recipe {
     /// Length of a physics step, s: what a plant for [`record`] is made with.
     pub fn step(&self) -> f64 {
-        1.0 / (self.rate * SUBSTEPS as f64)
+        1.0 / (self.rate * self.substeps as f64)
     }
 
     fn check(&self) -> Result<(), GenerateError> {
         let fail = |(name, value, expected)| GenerateError::Recipe { name, value, expected };
         if !(self.rate > 0.0 && self.rate.is_finite()) {
             return Err(fail(("rate", self.rate, "a positive number")));
+        }
+        if self.substeps == 0 {
+            return Err(fail(("substeps", 0.0, "one at least")));
         }
         if !(self.seconds > 0.0 && self.seconds * self.rate <= SAMPLES_AT_MOST) {
             return Err(fail(("seconds", self.seconds, "positive, and no more than ten million samples")));
@@ -202,7 +208,7 @@ pub fn follow(
             command[j].push(target[j]);
         }
         std::mem::swap(&mut seen, &mut before);
-        for _ in 0..SUBSTEPS {
+        for _ in 0..recipe.substeps {
             plant.step(&mut x, &effort);
         }
     }

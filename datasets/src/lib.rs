@@ -48,7 +48,7 @@ pub use episode::{Channel, Episode, Samples};
 pub use error::{LogError, LogErrorKind};
 pub use generate::{GenerateError, Recipe, Robot, follow, generate, record};
 pub use options::ReadOptions;
-pub use perturb::Perturbation;
+pub use perturb::{Perturbation, other_body};
 pub use read::read_logs;
 pub use reference::{Excitation, Reference, ReferenceError, ReferenceKind, excitation};
 pub use resample::{Uniform, derive_velocity, resample};

@@ -96,17 +96,27 @@ impl Perturbation {
         let [stretch, shift] = [self.stretch, self.center_of_mass]
             .map(|size| DVec3::from_array(std::array::from_fn(|_| size * normal(random))));
         let axes = DMat3::from_quat(DQuat::from_array(std::array::from_fn(|_| normal(random))).normalize());
-        let Some(center) = body.center_of_mass().filter(|_| body.mass > 0.0) else { return *body };
-        let rotational = body.about_center_of_mass();
-        let trace = |matrix: &DMat3| matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z;
-        // Second moment of the mass about its centre, ∫ x xᵀ dm; rotational inertia is tr(Σ) 1 − Σ.
-        let second = DMat3::from_diagonal(DVec3::splat(0.5 * trace(&rotational))) - rotational;
-        let stretched = axes * DMat3::from_diagonal(stretch.exp()) * axes.transpose();
-        let second = stretched * second * stretched.transpose() * factor;
-        let gyration = (0.5 * trace(&rotational) / body.mass).max(0.0).sqrt();
-        let inertia = DMat3::from_diagonal(DVec3::splat(trace(&second))) - second;
-        Inertia::from_com(factor * body.mass, center + gyration * shift, inertia)
+        let gyration = (0.5 * trace(&body.about_center_of_mass()) / body.mass).max(0.0).sqrt();
+        other_body(body, factor, gyration * shift, axes, stretch)
     }
+}
+
+/// A body changed as a body would be, so that a physical one stays physical: its mass times `factor`, its mass distribution
+/// stretched by e^`stretch` along the columns of `axes` about the centre of mass, then shifted by `shift`, m.
+/// A body without mass, or with a negative one, stays as it is.
+pub fn other_body(body: &Inertia, factor: f64, shift: DVec3, axes: DMat3, stretch: DVec3) -> Inertia {
+    let Some(center) = body.center_of_mass().filter(|_| body.mass > 0.0) else { return *body };
+    let rotational = body.about_center_of_mass();
+    // Second moment of the mass about its centre, ∫ x xᵀ dm; rotational inertia is tr(Σ) 1 − Σ.
+    let second = DMat3::from_diagonal(DVec3::splat(0.5 * trace(&rotational))) - rotational;
+    let stretched = axes * DMat3::from_diagonal(stretch.exp()) * axes.transpose();
+    let second = stretched * second * stretched.transpose() * factor;
+    let inertia = DMat3::from_diagonal(DVec3::splat(trace(&second))) - second;
+    Inertia::from_com(factor * body.mass, center + shift, inertia)
+}
+
+fn trace(matrix: &DMat3) -> f64 {
+    matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z
 }
 
 fn normal(random: &mut Pcg64) -> f64 {

@@ -20,11 +20,18 @@ pub struct Sensors {
     pub position_noise: f64,
     /// Step of the encoder, rad or m, to whose multiples positions are rounded; 0 for none. The servo sees it too.
     pub encoder_step: f64,
-    /// Cut-off of the first-order low-pass filter through which differences of the encoder become the logged velocity, Hz;
+    /// Step to whose multiples the logged position is rounded, rad or m; 0 for none. The servo, whose encoder turns with the
+    /// motor, does not see it.
+    pub log_step: f64,
+    /// Cut-off of the first-order low-pass filter through which differences of the logged position become the logged velocity, Hz;
     /// without it no velocity is logged. The servo takes the plain differences.
     pub velocity_cutoff: Option<f64>,
     /// Standard deviation of the noise of the logged effort, as a part of each joint's rms effort.
     pub effort_noise: f64,
+    /// Correlation time of that noise, s: a first-order autoregression; 0 for white noise.
+    pub effort_noise_time: f64,
+    /// Step of the logged effort, as a part of each joint's rms effort, to whose multiples it is rounded; 0 for none.
+    pub effort_step: f64,
     /// Amplitude of a ripple of the logged effort over position, 100 periods per rad or m, as a part of each joint's rms
     /// effort. The robot does not feel it.
     pub effort_ripple: f64,
@@ -39,8 +46,11 @@ impl Default for Sensors {
         Sensors {
             position_noise: 2e-6,
             encoder_step: 0.0,
+            log_step: 0.0,
             velocity_cutoff: None,
             effort_noise: 1e-3,
+            effort_noise_time: 0.0,
+            effort_step: 0.0,
             effort_ripple: 0.0,
             clock_jitter: 0.0,
             dropped: 0.0,
@@ -53,8 +63,11 @@ impl Sensors {
     pub const IDEAL: Sensors = Sensors {
         position_noise: 0.0,
         encoder_step: 0.0,
+        log_step: 0.0,
         velocity_cutoff: None,
         effort_noise: 0.0,
+        effort_noise_time: 0.0,
+        effort_step: 0.0,
         effort_ripple: 0.0,
         clock_jitter: 0.0,
         dropped: 0.0,
@@ -65,7 +78,10 @@ impl Sensors {
         let sizes = [
             ("position_noise", self.position_noise),
             ("encoder_step", self.encoder_step),
+            ("log_step", self.log_step),
             ("effort_noise", self.effort_noise),
+            ("effort_noise_time", self.effort_noise_time),
+            ("effort_step", self.effort_step),
             ("effort_ripple", self.effort_ripple),
             ("clock_jitter", self.clock_jitter),
         ];
@@ -88,13 +104,14 @@ impl Sensors {
     /// The encoder's reading of a position.
     pub(crate) fn position(&self, q: f64, random: &mut impl Rng) -> f64 {
         let noisy = q + self.position_noise * random.sample::<f64, _>(StandardNormal);
-        if self.encoder_step > 0.0 { (noisy / self.encoder_step).round() * self.encoder_step } else { noisy }
+        rounded(noisy, self.encoder_step)
     }
 
     /// The log that these sensors leave of a regularly sampled episode with positions as the encoder read them.
     pub(crate) fn log(&self, mut episode: Episode, random: &mut impl Rng) -> Episode {
         let samples = episode.len();
         let dt = episode.dt();
+        episode.position.iter_mut().flatten().for_each(|q| *q = rounded(*q, self.log_step));
         if let Some(cutoff) = self.velocity_cutoff {
             let share = -(-2.0 * PI * cutoff * dt).exp_m1();
             episode.velocity = Some(episode.position.iter().map(|q| filtered_velocity(q, dt, share)).collect());
@@ -102,9 +119,17 @@ impl Sensors {
         for (effort, q) in episode.effort.iter_mut().zip(&episode.position) {
             let rms = (effort.iter().map(|e| e * e).sum::<f64>() / samples as f64).sqrt();
             let phase = if self.effort_ripple > 0.0 { random.random_range(0.0..2.0 * PI) } else { 0.0 };
+            let step = self.effort_step * rms;
+            // Each noise keeps this part of the one before; without a correlation time, nothing.
+            let kept = if self.effort_noise_time > 0.0 { (-dt / self.effort_noise_time).exp() } else { 0.0 };
+            let mut noise = None;
             for (effort, q) in effort.iter_mut().zip(q) {
+                let fresh: f64 = random.sample(StandardNormal);
+                let now = noise.map_or(fresh, |before: f64| kept * before + (1.0 - kept * kept).sqrt() * fresh);
+                noise = Some(now);
                 let ripple = self.effort_ripple * (2.0 * PI * RIPPLE * q + phase).sin();
-                *effort += rms * (self.effort_noise * random.sample::<f64, _>(StandardNormal) + ripple);
+                *effort += rms * (self.effort_noise * now + ripple);
+                *effort = rounded(*effort, step);
             }
         }
         if self.clock_jitter > 0.0 {
@@ -120,6 +145,11 @@ impl Sensors {
         }
         episode
     }
+}
+
+/// The multiple of a step that is nearest; the value itself where the step is zero.
+fn rounded(value: f64, step: f64) -> f64 {
+    if step > 0.0 { (value / step).round() * step } else { value }
 }
 
 /// Backward differences through y ← y + share · (difference − y); the first one counts for the first sample too.

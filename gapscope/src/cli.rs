@@ -436,6 +436,10 @@ pub struct MakeBank {
     /// Cases with a law that the catalogue does not have
     #[arg(long, value_name = "N")]
     pub unknown: Option<usize>,
+    /// Used arms: friction, links, rotors and biases are off in most, and one further effect is beside that, an unknown one or
+    /// none; 2 for arms that are off by more. `--cases` counts them [default: each further kind once]
+    #[arg(long, value_name = "1|2", num_args = 0..=1, default_missing_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub used: Option<u8>,
     /// Robots, taken in turn: arm7, arm6, double_pendulum, or URDF files
     #[arg(long, value_name = "ROBOT,…", value_delimiter = ',', default_value = "arm7")]
     pub robots: Vec<String>,

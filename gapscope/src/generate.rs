@@ -130,7 +130,9 @@ fn recipe(args: &Generate) -> Recipe {
             effort_ripple: args.effort_ripple,
             clock_jitter: args.clock_jitter,
             dropped: args.dropped,
+            ..Sensors::IDEAL
         },
+        ..Recipe::default()
     }
 }
 

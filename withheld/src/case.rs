@@ -3,8 +3,9 @@
 use crate::draw::{Difficulty, Drawn, Sort, draw};
 use crate::outside::Disturbed;
 use crate::robot::Robot;
-use crate::truth::Truth;
-use crate::visibility::{power, residual};
+use crate::sight::{see, shows};
+use crate::truth::{Truth, Used, is_unknown};
+use crate::used::{arm, recipe};
 use gapscope_datasets::{Episode, GenerateError, Recipe, Sensors, generate, record};
 use gapscope_effects::{Effect, Kind, Plant};
 use rand::seq::IndexedRandom;
@@ -16,8 +17,9 @@ use serde_json::Value;
 const NOISE: [(f64, f64); 3] = [(1e-7, 1e-4), (2e-6, 2e-3), (1e-5, 1e-2)];
 /// Paces of the motions.
 const SPEED: [f64; 3] = [0.6, 1.0, 1.5];
-/// Draws before a case is given up.
+/// Draws before a case is given up, and before a used arm is.
 const ATTEMPTS: usize = 12;
+const ATTEMPTS_USED: usize = 40;
 /// A robot that strays further from its reference has not followed it, rad (m).
 const ASTRAY: f64 = 0.6;
 /// Least share of the samples that a saturation must clip.
@@ -30,8 +32,10 @@ const STRONGEST: usize = 3;
 /// What is asked of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaseSpec {
-    /// What it is made of; nothing for a case without an effect.
+    /// What it is made of; nothing for a case without an effect. Of a used arm, what is beside its calibration.
     pub sorts: Vec<Sort>,
+    /// How used the arm is; `None` where everything but the effects is as in its URDF.
+    pub used: Option<Used>,
     /// Its seed.
     pub seed: u64,
     /// How large the effects are.
@@ -47,6 +51,8 @@ pub struct CaseSpec {
 /// A case as it is handed out, and its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Case {
+    /// The robot's description that goes with the logs.
+    pub urdf: String,
     /// The logs.
     pub episodes: Vec<Episode>,
     /// Sealed test episodes.
@@ -59,8 +65,10 @@ pub struct Case {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CaseError {
     /// No log could be made of any draw.
-    #[error("{robot} with {kinds} does not follow its reference in {ATTEMPTS} draws; the last: {last}")]
+    #[error("{robot} with {kinds} does not follow its reference in {draws} draws; the last: {last}")]
     NoDraw {
+        /// How often it was drawn.
+        draws: usize,
         /// The robot.
         robot: String,
         /// What was drawn.
@@ -78,32 +86,43 @@ pub fn make_case(robot: &Robot, spec: &CaseSpec) -> Result<Case, CaseError> {
     let mut random = Pcg64::seed_from_u64(spec.seed);
     let level = NOISE[random.random_range(0..NOISE.len())];
     let mut last = String::new();
-    for number in 0..ATTEMPTS {
-        let clip = MILDER.powi(number as i32);
+    let draws = if spec.used.is_some() { ATTEMPTS_USED } else { ATTEMPTS };
+    for number in 0..draws {
+        let clip = MILDER.powi((number % ATTEMPTS) as i32);
         match attempt(robot, spec, level, clip, &mut random) {
-            Ok(Some(case)) => return Ok(case),
-            Ok(None) => last = format!("more than {ASTRAY} rad off, or a saturation that does not bite"),
+            Ok(Ok(case)) => return Ok(case),
+            Ok(Err(why)) => last = why,
             Err(error) => last = error.to_string(),
         }
     }
     let kinds: Vec<&str> = spec.sorts.iter().map(|sort| sort.name()).collect();
-    Err(CaseError::NoDraw { robot: robot.name.clone(), kinds: kinds.join(", "), last })
+    Err(CaseError::NoDraw { draws, robot: robot.name.clone(), kinds: kinds.join(", "), last })
 }
 
-/// One draw; `None` where the robot did not follow or a saturation did not clip. `clip` makes saturations milder.
+/// One draw, or why there must be another. `clip` makes saturations milder.
 fn attempt(
     robot: &Robot,
     spec: &CaseSpec,
     (position_noise, effort_noise): (f64, f64),
     clip: f64,
     random: &mut Pcg64,
-) -> Result<Option<Case>, GenerateError> {
+) -> Result<Result<Case, String>, GenerateError> {
     let count = spec.episodes + spec.tests;
-    let mut drawn: Vec<Drawn> =
-        spec.sorts.iter().map(|sort| draw(*sort, robot, spec.difficulty, count, spec.seconds, random)).collect();
-    let sensors = Sensors { position_noise, effort_noise, ..Sensors::IDEAL };
+    let (robot, mut drawn, recipe) = match spec.used {
+        None => {
+            let draw = |sort: &Sort| draw(*sort, robot, spec.difficulty, count, spec.seconds, random);
+            let drawn: Vec<Drawn> = spec.sorts.iter().map(draw).collect();
+            let sensors = Sensors { position_noise, effort_noise, ..Sensors::IDEAL };
+            (robot.clone(), drawn, Recipe { sensors, ..Recipe::default() })
+        }
+        Some(used) => {
+            let (robot, drawn) = arm(robot, used, spec, random);
+            (robot, drawn, recipe(random))
+        }
+    };
+    let robot = &robot;
     let motor_encoders = drawn.iter().any(|drawn| drawn.motor_encoder);
-    let recipe = Recipe { seconds: spec.seconds, motor_encoders, sensors, ..Recipe::default() };
+    let recipe = Recipe { seconds: spec.seconds, motor_encoders, ..recipe };
     let quiet = Recipe { sensors: Sensors::IDEAL, ..recipe };
     let seeds: Vec<u64> = (0..=count).map(|_| random.random()).collect();
     let speeds: Vec<f64> = (0..count).map(|_| SPEED.choose(random).copied().unwrap_or(1.0)).collect();
@@ -127,11 +146,16 @@ fn attempt(
         limit = Some((joint, at));
     }
 
+    see(robot, &mut drawn, seeds[count], &recipe, &quiet, spec.used.is_some())?;
+    let dim = drawn.iter().find(|drawn| !shows(&drawn.sealed)).filter(|_| spec.used.is_some());
+    if let Some(dim) = dim {
+        return Ok(Err(format!("{} is under the noise", dim.sealed.kind)));
+    }
     let mut logs = Vec::with_capacity(count);
     for episode in 0..count {
         let log = run(&drawn, episode, &recipe)?;
         if strays(&log) {
-            return Ok(None);
+            return Ok(Err(format!("more than {ASTRAY} rad off")));
         }
         logs.push(log);
     }
@@ -139,29 +163,33 @@ fn attempt(
         |logs: &[Episode]| limit.is_none_or(|(joint, limit)| logs.is_empty() || clipped(logs, joint, limit) >= CLIPPED);
     let (episodes, tests) = logs.split_at(spec.episodes);
     if !(bites(episodes) && bites(tests)) {
-        return Ok(None);
+        return Ok(Err("a saturation that does not bite".into()));
     }
-    see(robot, &mut drawn, seeds[count], &recipe, &quiet)?;
+    let sensors = &recipe.sensors;
+    // Rounding is off by a twelfth of the squared step in the mean.
+    let position_noise = sensors.position_noise.hypot(sensors.log_step / 12f64.sqrt());
     let speed_noise = 2f64.sqrt() * position_noise * recipe.rate;
-    let kinds = if spec.sorts.is_empty() {
-        vec!["none".to_owned()]
-    } else {
-        spec.sorts.iter().map(|sort| sort.name().to_owned()).collect()
-    };
+    let mut kinds: Vec<String> = drawn.iter().map(|drawn| drawn.sealed.kind.clone()).collect();
+    if kinds.is_empty() {
+        kinds.push("none".into());
+    }
     let truth = Truth {
         robot: robot.name.clone(),
         seed: spec.seed,
-        noise: [position_noise, speed_noise, effort_noise],
-        known: spec.sorts.iter().all(|sort| matches!(sort, Sort::Known(_))),
+        noise: [position_noise, speed_noise, sensors.effort_noise],
+        known: !kinds.iter().any(|kind| is_unknown(kind)),
+        used: spec.used,
+        rate: spec.used.map(|_| recipe.rate),
+        motion: spec.used.and_then(|_| Some(serde_json::to_value(recipe.motion).ok()?.as_str()?.to_owned())),
         kinds,
         effects: drawn.into_iter().map(|drawn| drawn.sealed).collect(),
     };
     let tests = logs.split_off(spec.episodes);
-    Ok(Some(Case { episodes: logs, tests, truth }))
+    Ok(Ok(Case { urdf: robot.urdf.clone(), episodes: logs, tests, truth }))
 }
 
 /// A log of the robot with what was drawn.
-fn simulate(
+pub(crate) fn simulate(
     robot: &Robot,
     drawn: &[Drawn],
     episode: usize,
@@ -179,33 +207,6 @@ fn simulate(
     }
     let mut disturbed = Disturbed::new(plant, law, &robot.model);
     record(&robot.model, &effects, &mut disturbed, seed, recipe, "episode")
-}
-
-/// Writes into each effect how visible it is, compared with the same robot without it and without noise; a drive that
-/// winds up, with one that has only its rotor. A saturation's torque is in the log, so that its signature says nothing.
-fn see(robot: &Robot, drawn: &mut [Drawn], seed: u64, recipe: &Recipe, quiet: &Recipe) -> Result<(), GenerateError> {
-    if drawn.is_empty() {
-        return Ok(());
-    }
-    let run = |drawn: &[Drawn], recipe: &Recipe| -> Result<Vec<Vec<f64>>, GenerateError> {
-        Ok(residual(&robot.model, &simulate(robot, drawn, 0, seed, recipe)?))
-    };
-    let noise = run(&[], recipe)?;
-    let with = run(drawn, quiet)?;
-    for which in 0..drawn.len() {
-        if drawn[which].sealed.kind == Kind::TorqueSaturation.name() {
-            continue;
-        }
-        let mut rest = drawn.to_vec();
-        rest[which].effects.clear();
-        rest[which].contacts.clear();
-        rest[which].outside = None;
-        // A robot that falls over without its effect says nothing about its size.
-        if let Ok(without) = run(&rest, quiet) {
-            drawn[which].sealed.power = power(&with, &without, &noise);
-        }
-    }
-    Ok(())
 }
 
 /// One of the joints of greatest rms effort.
@@ -241,6 +242,7 @@ mod tests {
     use super::*;
     use crate::outside::Outside;
     use crate::truth::DETECTABLE;
+    use crate::visibility::residual;
     use gapscope_dynamics::{Model, robots};
     use std::f64::consts::TAU;
 
@@ -250,7 +252,7 @@ mod tests {
     }
 
     fn spec(sorts: Vec<Sort>, seed: u64) -> CaseSpec {
-        CaseSpec { sorts, seed, difficulty: Difficulty::Mixed, seconds: 3.0, episodes: 1, tests: 1 }
+        CaseSpec { sorts, used: None, seed, difficulty: Difficulty::Mixed, seconds: 3.0, episodes: 1, tests: 1 }
     }
 
     #[test]

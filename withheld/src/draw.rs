@@ -96,6 +96,17 @@ impl Drawn {
     }
 }
 
+impl Difficulty {
+    /// Least and greatest size.
+    pub(crate) fn sizes(self) -> (f64, f64) {
+        match self {
+            Difficulty::Easy => (0.8, 2.0),
+            Difficulty::Hard => (0.25, 0.8),
+            Difficulty::Mixed => (0.3, 2.0),
+        }
+    }
+}
+
 fn one(robot: &Robot, joint: usize, value: f64) -> BTreeMap<String, f64> {
     [(robot.joint(joint), value)].into()
 }
@@ -110,11 +121,7 @@ pub(crate) fn draw(
     random: &mut Pcg64,
 ) -> Drawn {
     let (n, f) = (robot.dof(), &robot.friction);
-    let (low, high) = match difficulty {
-        Difficulty::Easy => (0.8, 2.0),
-        Difficulty::Hard => (0.25, 0.8),
-        Difficulty::Mixed => (0.3, 2.0),
-    };
+    let (low, high) = difficulty.sizes();
     let all: Vec<usize> = (0..n).collect();
     let some: Vec<usize> = if random.random_bool(0.5) {
         let count = random.random_range(1..=n);
@@ -304,7 +311,8 @@ pub(crate) fn draw(
         _ => serde_json::Map::new(),
     };
     let joint_names = joints.iter().map(|&j| robot.joint(j)).collect();
-    let sealed = SealedEffect { kind: sort.name().to_owned(), joints, joint_names, power: vec![], parameters };
+    let kind = sort.name().to_owned();
+    let sealed = SealedEffect { kind, joints, joint_names, power: vec![], part: None, parameters };
     Drawn { sealed, effects, contacts, outside, rotor, motor_encoder }
 }
 
@@ -352,12 +360,17 @@ fn link_error(robot: &Robot, joint: usize, scale: f64, shift: [f64; 3]) -> Effec
     let body = &robot.model.joints()[joint].inertia;
     let center = body.center_of_mass().unwrap_or_default() + DVec3::from_array(shift);
     let other = Inertia::from_com(scale * body.mass, center, body.about_center_of_mass() * scale);
-    let (before, after) = (body.parameters(), other.parameters());
+    Effect::LinkInertiaError(difference(robot, joint, &other))
+}
+
+/// What a link's body has more than in the URDF.
+pub(crate) fn difference(robot: &Robot, joint: usize, other: &Inertia) -> LinkInertiaError {
+    let (before, after) = (robot.model.joints()[joint].inertia.parameters(), other.parameters());
     let [mass_delta, x, y, z, xx, xy, yy, xz, yz, zz] = std::array::from_fn(|i| after[i] - before[i]);
-    Effect::LinkInertiaError(LinkInertiaError {
+    LinkInertiaError {
         joint: robot.joint(joint),
         mass_delta,
         first_moment_delta: [x, y, z],
         inertia_delta: [xx, xy, yy, xz, yz, zz],
-    })
+    }
 }

@@ -2,6 +2,7 @@
 
 use crate::case::CaseSpec;
 use crate::draw::{Difficulty, Sort, UNKNOWN};
+use crate::truth::Used;
 use gapscope_effects::Kind;
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{RngExt, SeedableRng};
@@ -47,9 +48,27 @@ pub struct Plan {
     pub episodes: usize,
     /// Sealed test episodes per case.
     pub tests: usize,
+    /// Used arms: then `cases` have a further effect of the catalogue, `unknown` a law outside it, and `none` nothing further.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub used: Option<Used>,
 }
 
+/// Parts of a bank of used arms that have a further effect of the catalogue, and one outside it.
+const FURTHER: [f64; 2] = [0.7, 0.15];
+
 impl Plan {
+    /// Shares out a bank of used arms: seven tenths have a further effect, as many an unknown one as nothing further.
+    pub fn share_out(&mut self, arms: usize) {
+        let [known, unknown] = FURTHER.map(|part| (part * arms as f64).round() as usize);
+        (self.cases, self.unknown) = (known, unknown.min(arms - known));
+        self.none = arms - self.cases - self.unknown;
+    }
+
+    /// Used arms enough for each kind to be the further effect of one.
+    pub fn used_arms(used: Used) -> usize {
+        (further(Some(used)).len() as f64 / FURTHER[0]).round() as usize
+    }
+
     /// Counts of one case of each kind, of each law outside the catalogue and of none.
     pub fn one_of_each(&mut self) {
         (self.cases, self.unknown, self.none) = (Kind::ALL.len(), UNKNOWN.len(), 1);
@@ -58,7 +77,7 @@ impl Plan {
     /// The cases, in an order that says nothing about what they hold.
     pub fn specs(&self) -> Vec<CaseSpec> {
         let mut random = Pcg64::seed_from_u64(self.seed);
-        let mut kinds: Vec<Sort> = Kind::ALL.into_iter().map(Sort::Known).collect();
+        let mut kinds: Vec<Sort> = further(self.used).into_iter().map(Sort::Known).collect();
         let mut laws: Vec<Sort> = (0..UNKNOWN.len()).map(Sort::Unknown).collect();
         kinds.shuffle(&mut random);
         laws.shuffle(&mut random);
@@ -72,6 +91,7 @@ impl Plan {
         plan.shuffle(&mut random);
         let spec = |(i, sorts)| CaseSpec {
             sorts,
+            used: self.used,
             seed: self.seed.wrapping_mul(1000).wrapping_add(i as u64),
             difficulty: self.difficulty,
             seconds: self.seconds,
@@ -80,6 +100,12 @@ impl Plan {
         };
         plan.into_iter().enumerate().map(spec).collect()
     }
+}
+
+/// Kinds that are no calibration of an arm that is as used.
+fn further(used: Option<Used>) -> Vec<Kind> {
+    let calibration = used.map_or(&[][..], Used::calibration);
+    Kind::ALL.into_iter().filter(|kind| !calibration.contains(kind)).collect()
 }
 
 /// Kinds that stand beside others: a contact would hide them for as long as it lasts.
@@ -120,6 +146,7 @@ mod tests {
             seconds: 10.0,
             episodes: 4,
             tests: 2,
+            used: None,
         }
     }
 

@@ -1,5 +1,6 @@
 //! What a withheld case keeps sealed.
 
+use gapscope_effects::Kind;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -21,6 +22,86 @@ pub struct Truth {
     pub effects: Vec<SealedEffect>,
     /// Whether the catalogue has all kinds.
     pub known: bool,
+    /// How used the arm is; `None` where everything but the effects is as in its URDF.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub used: Option<Used>,
+    /// Rate of a used arm's logs, Hz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<f64>,
+    /// Family of a used arm's motions, by name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<String>,
+}
+
+/// How used an arm is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "u8", into = "u8")]
+pub enum Used {
+    /// A little off everywhere: friction, links, rotors, biases. Written as 1.
+    Little,
+    /// Links off by up to a third, another tool, a cable, friction that differs by direction. Written as 2.
+    Much,
+}
+
+impl Used {
+    /// Both, in the order of reports.
+    pub const ALL: [Used; 2] = [Used::Little, Used::Much];
+
+    /// The name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Used::Little => "used",
+            Used::Much => "used 2",
+        }
+    }
+
+    /// The kinds that are calibration on such an arm.
+    pub fn calibration(self) -> &'static [Kind] {
+        const KINDS: [Kind; 7] = [
+            Kind::ViscousFriction,
+            Kind::CoulombFriction,
+            Kind::LinkInertiaError,
+            Kind::Armature,
+            Kind::TorqueBias,
+            Kind::Payload,
+            Kind::ParallelSpring,
+        ];
+        match self {
+            Used::Little => &KINDS[..5],
+            Used::Much => &KINDS,
+        }
+    }
+}
+
+impl TryFrom<u8> for Used {
+    type Error = String;
+
+    fn try_from(level: u8) -> Result<Used, String> {
+        match level {
+            1 => Ok(Used::Little),
+            2 => Ok(Used::Much),
+            _ => Err(format!("an arm is used 1 or 2, not {level}")),
+        }
+    }
+}
+
+impl From<Used> for u8 {
+    fn from(used: Used) -> u8 {
+        match used {
+            Used::Little => 1,
+            Used::Much => 2,
+        }
+    }
+}
+
+/// What an effect of a used arm is a part of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// A little off on any arm that was used.
+    Calibration,
+    /// What somebody would be looking for.
+    Further,
 }
 
 /// One sealed effect.
@@ -35,6 +116,9 @@ pub struct SealedEffect {
     /// Per joint of the robot, the effect's signature over the log's noise; empty where it cannot be given.
     #[serde(default)]
     pub power: Vec<f64>,
+    /// What it is a part of, on a used arm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<Part>,
     /// Parameters under the truth's short names, one number or one per affected joint.
     #[serde(flatten)]
     pub parameters: Map<String, Value>,

@@ -2,12 +2,19 @@
 
 use gapscope_datasets::Episode;
 use gapscope_dynamics::{Data, Model};
+use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{LN_2, PI};
 
 /// Band of the comparison, Hz: where the smoothing lets half the power through.
 const BAND: f64 = 10.0;
 /// Independent values that a case holds below the band: two per period over 40 s.
 const INDEPENDENT: f64 = 2.0 * BAND * 40.0;
+/// Rate at which a signature is held against what calibration can take over, Hz: two and a half rows a period of the band.
+const ROWS: f64 = 2.5 * BAND;
+/// Speed below which the sign of dry friction is soft, rad/s (m/s).
+const SOFT: f64 = 0.005;
+/// What is added to the diagonal of normalised normal equations, so that parameters which no motion shows do no harm.
+const RIDGE: f64 = 1e-10;
 /// Samples left out at each end, where the smoothing lacks neighbours.
 const EDGE: usize = 50;
 
@@ -35,6 +42,11 @@ pub(crate) fn residual(model: &Model, log: &Episode) -> Vec<Vec<f64>> {
     rest.iter().map(|row| smooth(row, rate)).collect()
 }
 
+/// The difference of two residuals, row by row.
+pub(crate) fn less(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect()
+}
+
 /// Signature over noise of each joint: sqrt(800) rms(with − without)/rms(noise), rounded to 0.01.
 pub(crate) fn power(with: &[Vec<f64>], without: &[Vec<f64>], noise: &[Vec<f64>]) -> Vec<f64> {
     let joint = |j: usize| {
@@ -43,6 +55,66 @@ pub(crate) fn power(with: &[Vec<f64>], without: &[Vec<f64>], noise: &[Vec<f64>])
         (100.0 * power).round() / 100.0
     };
     (0..with.len()).map(joint).collect()
+}
+
+/// [`power`] of what calibration cannot take over of a signature: bodies of all links, Coulomb and viscous friction, rotors and
+/// biases, fitted to it along the motion of a log, all joints together and each by its noise.
+pub(crate) fn beside(
+    model: &Model,
+    log: &Episode,
+    with: &[Vec<f64>],
+    without: &[Vec<f64>],
+    noise: &[Vec<f64>],
+) -> Vec<f64> {
+    let n = model.dof();
+    let rate = 1.0 / log.dt();
+    let every = (rate / ROWS).round().max(1.0) as usize;
+    let edge = EDGE.min(log.len() / 4);
+    let rows: Vec<usize> = (edge..log.len().saturating_sub(edge)).step_by(every).collect();
+    let q: Vec<Vec<f64>> = log.position.iter().map(|q| smooth(q, rate)).collect();
+    let speed = |j: usize, k: usize| 0.5 * rate * (q[j][k + 1] - q[j][k - 1]);
+    let dry = |j: usize| {
+        let sign: Vec<f64> = (1..log.len() - 1).map(|k| (speed(j, k) / SOFT).tanh()).collect();
+        smooth(&sign, rate)
+    };
+    let dry: Vec<Vec<f64>> = (0..n).map(dry).collect();
+    let weight: Vec<f64> = noise.iter().map(|noise| 1.0 / (rms(noise) + 1e-9)).collect();
+    let mut columns = DMatrix::zeros(n * rows.len(), 14 * n);
+    let mut signature = DVector::zeros(n * rows.len());
+    let (mut data, mut block) = (Data::new(model), DMatrix::zeros(n, 10 * n));
+    let [mut at, mut v, mut a] = std::array::from_fn(|_| vec![0.0; n]);
+    for (row, &k) in rows.iter().enumerate() {
+        for j in 0..n {
+            (at[j], v[j]) = (q[j][k], speed(j, k));
+            a[j] = rate * rate * (q[j][k + 1] - 2.0 * q[j][k] + q[j][k - 1]);
+        }
+        model.regressor(&mut data, &at, &v, &a, &mut block);
+        for j in 0..n {
+            let row = row * n + j;
+            signature[row] = weight[j] * (with[j][k - 1] - without[j][k - 1]);
+            for c in 0..10 * n {
+                columns[(row, c)] = weight[j] * block[(j, c)];
+            }
+            for (i, value) in [dry[j][k - 1], v[j], a[j], 1.0].into_iter().enumerate() {
+                columns[(row, (10 + i) * n + j)] = weight[j] * value;
+            }
+        }
+    }
+    for mut column in columns.column_iter_mut() {
+        let length = column.norm();
+        column /= length.max(1e-12);
+    }
+    let mut normal = columns.tr_mul(&columns);
+    (0..14 * n).for_each(|c| normal[(c, c)] += RIDGE);
+    if let Some(factor) = normal.cholesky() {
+        signature -= &columns * factor.solve(&columns.tr_mul(&signature));
+    }
+    let joint = |j: usize| {
+        let square: f64 = signature.iter().skip(j).step_by(n).map(|x| x * x).sum();
+        let power = (INDEPENDENT * square / rows.len().max(1) as f64).sqrt();
+        (100.0 * power).round() / 100.0
+    };
+    (0..n).map(joint).collect()
 }
 
 fn rms(x: &[f64]) -> f64 {

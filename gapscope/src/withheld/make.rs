@@ -7,7 +7,7 @@ use crate::output;
 use anyhow::{Context, Result, bail};
 use gapscope_datasets::{Episode, write_csv};
 use gapscope_dynamics::{Model, robots};
-use gapscope_withheld::{Case, CaseSpec, Difficulty, Plan, Robot, make_case};
+use gapscope_withheld::{Case, CaseSpec, Difficulty, Plan, Robot, Used, make_case};
 use rayon::prelude::*;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 const SETTINGS: &str = "bank.json";
 /// Shortest episode, s: three contacts, or a friction that drifts, need some time.
 const SHORTEST: f64 = 2.0;
-/// Steps to which logs are rounded: position, rad or m, and effort, N m or N. Digits below are nobody's measurement.
+/// Steps to which logs are rounded: position, rad or m; effort, N m or N, and velocity, rad/s or m/s. Digits below are nobody's measurement.
 const STEPS: (f64, f64) = (1e-9, 1e-7);
 
 /// Makes a bank, or what it still lacks; returns what to print.
@@ -69,8 +69,16 @@ fn plan(args: &MakeBank) -> Result<Plan> {
         seconds: args.seconds,
         episodes: args.episodes,
         tests: args.tests,
+        used: args.used.map(Used::try_from).transpose().map_err(anyhow::Error::msg)?,
     };
-    if counts.iter().all(Option::is_none) {
+    if let Some(used) = plan.used {
+        if [multi, mixed, none, unknown].iter().any(|count| *count > 0) {
+            bail!(
+                "with --used, --cases alone counts: seven tenths have a further effect, the rest an unknown one or none"
+            );
+        }
+        plan.share_out(args.cases.unwrap_or_else(|| Plan::used_arms(used)));
+    } else if counts.iter().all(Option::is_none) {
         plan.one_of_each();
     }
     if !(SHORTEST..=1e4).contains(&plan.seconds) {
@@ -159,7 +167,7 @@ impl Place {
         for folder in self.drafts.iter().chain(&self.folders).filter(|folder| folder.exists()) {
             fs::remove_dir_all(folder).with_context(|| format!("cannot remove {}", folder.display()))?;
         }
-        self.write(robot, case)?;
+        self.write(case)?;
         // The sealed part first: a case is there for the diagnoser only once it can be judged.
         for (draft, folder) in self.drafts.iter().zip(&self.folders).rev() {
             fs::rename(draft, folder).with_context(|| format!("cannot make {}", folder.display()))?;
@@ -167,12 +175,12 @@ impl Place {
         Ok(None)
     }
 
-    fn write(&self, robot: &Robot, case: Case) -> Result<()> {
+    fn write(&self, case: Case) -> Result<()> {
         let [open, sealed] = &self.drafts;
         for draft in &self.drafts {
             fs::create_dir(draft).with_context(|| format!("cannot make the folder {}", draft.display()))?;
         }
-        output::write(&open.join("robot.urdf"), &robot.urdf)?;
+        output::write(&open.join("robot.urdf"), &case.urdf)?;
         for (folder, name, logs) in [(open, "episode", case.episodes), (sealed, "test", case.tests)] {
             for (i, log) in logs.into_iter().enumerate() {
                 write_csv(folder.join(format!("{name}_{i}.csv")), &rounded(log), false)?;
@@ -190,6 +198,9 @@ fn rounded(mut log: Episode) -> Episode {
     };
     round(&mut log.position, STEPS.0);
     round(&mut log.effort, STEPS.1);
+    if let Some(velocity) = &mut log.velocity {
+        round(velocity, STEPS.1);
+    }
     if let Some(command) = &mut log.command {
         round(command, STEPS.0);
     }

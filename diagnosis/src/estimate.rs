@@ -1,12 +1,12 @@
 //! From coefficients to effects with parameters and intervals.
 
 use crate::band::Band;
-use crate::climb::LATE;
 use crate::problem::Problem;
 use crate::schema::{Estimate, Parameter, Quantity};
+use crate::select::LATE;
 use crate::signals::Signals;
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::{Candidate, Effect, Kind, Plant, Value, keep_bodies};
+use gapscope_effects::{Candidate, Effect, Kind, Value};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -87,22 +87,9 @@ impl Fit {
             .unzip()
     }
 
-    /// The effects, one a kind where the kind has a value per joint. Candidates whose coefficients no physical effect has are
-    /// left out. Links may be what no body is: where a search moves on from here, a body that was moved would lead it astray.
+    /// The effects, one a kind where the kind has a value per joint. Candidates whose coefficients no physical effect has are left out.
     pub fn effects(&self, problem: &Problem, model: &Model) -> Vec<Effect> {
-        let mut effects: Vec<Effect> =
-            self.effects_with_candidates(problem, model).into_iter().map(|(effect, _)| effect).collect();
-        if Plant::new(model, &effects, 1e-3).is_err() {
-            keep_bodies(model, &mut effects);
-        }
-        effects
-    }
-
-    /// The same with every link a body.
-    pub fn bodies(&self, problem: &Problem, model: &Model) -> Vec<Effect> {
-        let mut effects = self.effects(problem, model);
-        keep_bodies(model, &mut effects);
-        effects
+        self.effects_with_candidates(problem, model).into_iter().map(|(effect, _)| effect).collect()
     }
 
     /// The effects, each with the candidates that it is made of.
@@ -239,7 +226,7 @@ fn insert(parameters: &mut BTreeMap<String, Parameter>, model: &Model, value: &V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::support::{fitted, torque};
+    use crate::constancy::tests::{fitted, torque};
 
     /// A drag that grows with the square of the speed, fitted as one that grows with it, is too weak at any high speed and too
     /// strong at any low one: in every block of time the two are nearly even, and only parts of the speed tell.

@@ -4,10 +4,10 @@
 //! by the model (instrumental variables; Söderström and Stoica, Instrumental Variable Methods for System Identification,
 //! 1983).
 
-use crate::climb::{Choice, LATE};
 use crate::diagnose::Logs;
 use crate::gap::{self, Rows};
 use crate::search::{Chosen, with_drive};
+use crate::select::{self, LATE};
 use gapscope_effects::{Candidate, EffectError, Kind};
 
 /// Standard error below which the part that speaks for the other law is not believed: no drive is one or the other exactly.
@@ -42,7 +42,7 @@ impl Logs<'_> {
         }
         set.sort_unstable();
         let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
-        let choice = Choice { set };
+        let choice = select::evaluate(&chosen.all, set);
         Ok(Chosen { choice, exact, fit, late_doubt: Some(1.0 - doubt), ..chosen })
     }
 

@@ -9,7 +9,7 @@
 mod band;
 mod bootstrap;
 mod break_away;
-mod climb;
+mod constancy;
 mod contact;
 mod corrected;
 mod diagnose;
@@ -25,6 +25,7 @@ mod kernel;
 mod late;
 mod learner;
 mod limits;
+mod load;
 mod power;
 mod problem;
 mod refine;
@@ -33,9 +34,8 @@ mod rollout;
 pub mod schema;
 mod screen;
 mod search;
+mod select;
 mod signals;
-#[cfg(test)]
-mod support;
 mod verdict;
 
 pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};

@@ -7,7 +7,7 @@ use crate::estimate::Fit;
 use crate::problem::{Problem, Term};
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
-use gapscope_effects::{Candidate, Effect, EffectError, Kind, Motion, Plant};
+use gapscope_effects::{Candidate, EffectError, Kind, Motion, Plant};
 use rayon::prelude::*;
 
 /// Rounds, at most.
@@ -54,7 +54,8 @@ pub struct Data<'a> {
 impl Data<'_> {
     /// A problem of some terms, weighed by what all those of some kinds leave.
     pub fn problem(&self, terms: Vec<Term>, weighed_by: &[Kind]) -> Problem {
-        let mut problem = Problem::new(self.model, self.signals, self.band, self.standstill, self.moving, terms);
+        let mut problem =
+            Problem::new(self.model, self.signals, self.band, self.standstill, self.moving, terms, self.noise);
         let weighs = |c: &usize| weighed_by.contains(&problem.entries[*c].candidate.kind);
         let set: Vec<usize> = (0..problem.entries.len()).filter(weighs).collect();
         problem.weigh(self.band, &set);
@@ -126,25 +127,15 @@ impl Data<'_> {
         let effects = Fit { set, ..fit.clone() }.effects(problem, self.model);
         let side = problem.side(&fit.set);
         let crossed = effects.iter().any(|effect| effect.kind() == Kind::Backlash);
-        let early =
-            |c: &usize| !matches!(candidate(*c).kind, Kind::ActuationDelay | Kind::ActuatorLag | Kind::TorqueGainError);
-        let taken = Fit { set: fit.set.iter().copied().filter(early).collect(), ..fit.clone() };
-        let taken = taken.effects(problem, self.model);
         self.signals
             .par_iter()
             .map(|s| {
-                let idle: Vec<Vec<f64>> = s.tau.iter().map(|tau| vec![0.0; tau.len()]).collect();
-                let torque = |effects: &[Effect], tau: &[Vec<f64>]| -> Result<Vec<Vec<f64>>, EffectError> {
-                    let mut plant = plant_pushed(self.model, effects, side, s.dt, &s.pushed)?;
-                    let rest = plant.residuals(&Motion { tau, held: None, ..s.motion(self.model, self.standstill) });
-                    let less = |(tau, rest): (&Vec<f64>, &Vec<f64>)| tau.iter().zip(rest).map(|(t, r)| t - r).collect();
-                    Ok(tau.iter().zip(&rest).map(less).collect())
-                };
-                Ok(Signals {
-                    load: Some(torque(&effects, if crossed { &s.tau } else { &idle })?),
-                    taken: Some(torque(&taken, if crossed { &s.tau } else { &idle })?),
-                    ..s.clone()
-                })
+                let mut plant = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
+                let idle = || s.tau.iter().map(|tau| vec![0.0; tau.len()]).collect();
+                let tau: Vec<Vec<f64>> = if crossed { s.tau.clone() } else { idle() };
+                let rest = plant.residuals(&Motion { tau: &tau, held: None, ..s.motion(self.model, self.standstill) });
+                let less = |(tau, rest): (&Vec<f64>, &Vec<f64>)| tau.iter().zip(rest).map(|(t, r)| t - r).collect();
+                Ok(Signals { load: Some(tau.iter().zip(&rest).map(less).collect()), ..s.clone() })
             })
             .collect()
     }
@@ -160,7 +151,7 @@ impl Data<'_> {
         let mut curvature: Option<Vec<Vec<Vec<f64>>>> = None;
         let bends = candidates.iter().any(|c| BENT.contains(&c.kind));
         let least = if bends { ROUNDS_FOR_BENT } else { 1 };
-        let loads = candidates.iter().any(Candidate::reads_torque);
+        let loads = candidates.iter().any(|c| c.kind == Kind::LoadDependentFriction);
         let mut loaded: Option<Vec<Signals>> = None;
         let mut round = 0;
         loop {
@@ -194,7 +185,6 @@ impl Data<'_> {
             }
             if round >= ROUNDS || (round >= least && change < SETTLED) {
                 data.break_away(&mut problem, &fit)?;
-                problem.split(self.band);
                 return Ok((problem, fit));
             }
             let mut at = fit.clone();

@@ -1,26 +1,47 @@
 //! The search: which effects, at which parameters, from a first look at all of them to what the plant itself predicts.
 
-use crate::climb::{self, Choice, Competition};
+use crate::constancy;
 use crate::corrected::residual;
 use crate::diagnose::{Logs, Progress};
+use crate::drive::STANDS_IN;
 use crate::estimate::Fit;
 use crate::floor::noise_floor;
 use crate::gap;
+use crate::limits;
 use crate::problem::{Entry, Problem, Term};
 use crate::refine::Data;
 use crate::screen;
+use crate::select::{self, Choice};
 use crate::signals::Signals;
+use crate::verdict::Judged;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, EffectError, Kind, Plant, Range};
 use rayon::prelude::*;
 
+/// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
+const MANY: usize = 3;
+/// Laws outside the catalogue, limits that are reached now and then, and Stribeck friction for what motion alone shows as
+/// Coulomb friction are let in where with them this part of what is more than noise is left.
+const OPEN: f64 = 0.75;
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
-/// Times that a likelier account takes the place of what was chosen.
-const AGAIN: usize = 2;
-/// Nats that a spring or play must bring beside its rotor: as rare as any kind, on either side of the gear, a knob that the
-/// logs know to a twentieth of its range, and what the best of some hundred tries finds in noise.
-const TURNS: f64 = 3.0 + 0.7 + 3.0 + 9.0;
+/// Kinds that reach joints where they find nothing to explain, or with one coefficient for all that a joint carries can
+/// promise more than they keep.
+const REACHING: [Kind; 6] = [
+    Kind::Payload,
+    Kind::LinkInertiaError,
+    Kind::GravityMisalignment,
+    Kind::TorqueGainError,
+    Kind::ActuationDelay,
+    Kind::ActuatorLag,
+];
+
+/// Part of the effort's variation below which neither a drive nor a law outside the catalogue is looked for.
+const UNNOTICED: f64 = 2e-3;
+/// Part of the squared gap that must be left for a drive to be looked for near the noise floor.
+const ALL_BUT: f64 = 1e-3;
+/// What a kind more must take away, relative, where two sets with a drive are compared.
+pub(crate) const A_KIND: f64 = 0.02;
 
 /// What the search came to.
 pub(crate) struct Chosen {
@@ -38,10 +59,21 @@ pub(crate) struct Chosen {
     pub turned: Option<Turned>,
     /// Probability that a delay is a lag, or a lag a delay, where one is there and they were compared.
     pub late_doubt: Option<f64>,
-    /// Springs and plays that were held against a rigid drive, and by how many nats each won.
-    pub tried: Vec<(Candidate, f64)>,
-    /// By how many nats the logs, held against the exact law, speak for each kind beyond calibration.
-    pub needed: Vec<(Kind, f64)>,
+}
+
+/// A choice held against the plant.
+struct Tried {
+    chosen: Chosen,
+    /// Kinds of its set.
+    kinds: Vec<Kind>,
+    /// Held-out gap with it against the noise, as a part of the effort's variation.
+    judged: Judged,
+}
+
+impl Tried {
+    fn left(&self) -> f64 {
+        self.judged.all.after
+    }
 }
 
 /// A drive that turns on its own.
@@ -51,160 +83,194 @@ pub(crate) struct Turned {
     pub place: usize,
     /// Spring or play, its knob known.
     pub drive: Candidate,
-    /// By how many nats the best account with a rigid drive is less likely.
-    pub odds: f64,
-}
-
-impl Chosen {
-    /// By how many nats this account of the logs is likelier than another, each at its exact law.
-    pub fn odds_against(&self, other: &Chosen, logs: &Logs<'_>) -> Result<f64, EffectError> {
-        // What is left of the better account is nearer to noise: it says how many rows count as one.
-        let counts: Vec<f64> =
-            self.exact.correlation().iter().zip(other.exact.correlation()).map(|(a, b)| a.min(*b)).collect();
-        let (own, others) = (logs.noise_through(self)?, logs.noise_through(other)?);
-        let of = |chosen: &Chosen, noise: &[f64], rival: &[f64], blows: bool| {
-            let drive = if chosen.turns() { TURNS + (chosen.noise.len() as f64).ln() } else { 0.0 };
-            let prior = Competition::new(&chosen.all).prior(&chosen.choice.set) - drive;
-            // An account that makes less of the noise than another leaves less of it, and has explained nothing by that. One
-            // with blows makes anything of it.
-            let quieter: f64 = (0..noise.len())
-                .filter(|&j| !blows && noise[j] < rival[j] && noise[j] > 0.0)
-                .map(|j| chosen.exact.rows(j) / counts[j] * (rival[j] / noise[j]).ln())
-                .sum();
-            chosen.exact.evidence(&chosen.fit.columns, &chosen.fit.theta, &counts) + prior - quieter
-        };
-        Ok(of(self, &own, &others, other.blows()) - of(other, &others, &own, self.blows()))
-    }
-
-    /// Whether a drive in it hits a stop, from which noise comes back as blows.
-    fn blows(&self) -> bool {
-        self.exact.entries.iter().any(|e| e.candidate.blows())
-    }
-
-    fn turns(&self) -> bool {
-        self.exact.entries.iter().any(|e| e.candidate.turns())
-    }
+    /// Probability that the drive is rigid.
+    pub doubt: f64,
 }
 
 impl Logs<'_> {
-    /// Root mean square of what the noise of the logs makes of the rows of each joint behind an account, N m or N.
-    fn noise_through(&self, chosen: &Chosen) -> Result<Vec<f64>, EffectError> {
-        if self.noisier.len() != self.signals.len() {
-            return Ok(vec![0.0; self.model.dof()]);
-        }
-        let rows = |signals: &[Signals]| -> Result<gap::Rows, EffectError> {
-            let data = Data { signals, ..self.data(&chosen.noise) };
-            Ok(gap::at_rows(&self.band, &data.rest(&chosen.exact, &chosen.fit)?, self.model.dof()))
-        };
-        let (plain, noisier) = (rows(&self.signals)?, rows(&self.noisier)?);
-        let size = |(a, b): (&Vec<f64>, &Vec<f64>)| {
-            let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
-            (square / a.len().max(1) as f64).sqrt()
-        };
-        Ok(plain.iter().zip(&noisier).map(size).collect())
-    }
-
     /// The problem of all candidates, the set chosen from it, and the problem of that set alone at its exact parameters.
+    ///
+    /// What the normal equations promise is held against the torque that the plant really predicts on held-out data. Where
+    /// many kinds stand together or leave much, flexible laws may have bent to what none of them is: then the linear kinds
+    /// alone have their turn, and where they predict as well with no more of them, so has the set without each of its kinds.
+    /// Where more than noise is left, laws outside the catalogue compete, so that effects are chosen beside what they do not
+    /// explain instead of bent to it; then drives are looked for, and beside a drive those laws once more. A set that makes
+    /// the gap larger, or that of one joint much larger, is no explanation: then the next choice does without the kinds that
+    /// promise most.
     pub(crate) fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        let chosen = self.best_of(progress)?;
-        let chosen = self.drive(chosen, progress)?;
-        let chosen = self.likeliest(chosen, progress)?;
-        self.delay_or_lag(self.needed(chosen)?)
+        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
+        let before = gap::total(&gap::squares(&self.band, &self.nominal_rows(), |_| true));
+        // What the set leaves, beside what laws outside the catalogue in it account for.
+        let tried = |chosen: Chosen| -> Result<Tried, EffectError> {
+            let after = self.left_by_joint(&chosen.exact, &chosen.fit.set)?;
+            let judged = Judged::new(&before, &after, &chosen.noise, &weights, &chosen.exact.turning(&chosen.fit.set));
+            Ok(Tried { kinds: select::kinds(&chosen.exact, &chosen.fit.set), judged, chosen })
+        };
+        let without = |kinds: &[Kind]| -> Result<Tried, EffectError> {
+            tried(self.choose_among(&[kinds, &Kind::OUTSIDE].concat(), progress)?)
+        };
+        let mut best = without(&[])?;
+        let floor = best.judged.all.floor;
+        let beyond = |tried: &Tried| (tried.left().powi(2) - floor.powi(2)).max(0.0).sqrt();
+        if best.judged.leaves_much() {
+            // Rows beyond a limit that is reached now and then pass for outliers, unless limits have a say in that.
+            let weighed_by = [weighing(), vec![Kind::TorqueSaturation]].concat();
+            let limited = self.best_of(&Kind::OUTSIDE, &weighed_by, progress)?;
+            let limited = if limits::hold(&limited) { Some(tried(limited)?) } else { None };
+            best = limited.filter(|limited| beyond(limited) < OPEN * beyond(&best)).unwrap_or(best);
+        }
+        let every = best.chosen.all.clone();
+        let flexible: Vec<Kind> = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k)).collect();
+        let bends = best.kinds.iter().any(|kind| flexible.contains(kind));
+        if bends && (best.kinds.len() >= MANY || best.judged.leaves_much()) {
+            let linear = without(&flexible)?;
+            if linear.left() <= best.left() && linear.kinds.len() <= best.kinds.len() {
+                // One kind may have spoilt the others: each in turn does without.
+                let level = |tried: &Tried| tried.left() * (1.0 + A_KIND * tried.kinds.len() as f64);
+                for kind in std::mem::replace(&mut best, linear).kinds {
+                    let rest = without(&[kind])?;
+                    if level(&rest) < level(&best) {
+                        best = rest;
+                    }
+                }
+            }
+        }
+        if best.judged.leaves_any()
+            && let Some(sticking) = self.sticking(&best.chosen, every)?
+        {
+            let sticking = tried(sticking)?;
+            best = if beyond(&sticking) < OPEN * beyond(&best) { sticking } else { best };
+        }
+        let mut open = None;
+        let mut laws = None;
+        if best.judged.leaves_any() && best.left() > UNNOTICED {
+            let found = tried(self.choose_among(&[], progress)?)?;
+            laws = Some(found.chosen.all.clone());
+            open = Some(found).filter(|open| beyond(open) < OPEN * beyond(&best));
+        }
+        let much = best.judged.leaves_much();
+        // Joints whose drive is worth a look: all where anything is left, and else those whose rotor was found, which is a
+        // part of such a drive.
+        let drives = |tried: &Tried| -> Vec<usize> {
+            let stands_in = tried.kinds.iter().any(|kind| STANDS_IN.contains(kind));
+            let explained_otherwise = stands_in && tried.judged.unexplained_fraction() > ALL_BUT;
+            let all = tried.left() > UNNOTICED && (tried.judged.leaves_any() || explained_otherwise);
+            let rotors = tried.chosen.exact.entries.iter().filter(|e| e.candidate.kind == Kind::Armature);
+            let rotors: Vec<usize> = rotors.flat_map(|e| e.candidate.joints.iter().copied()).collect();
+            (0..self.model.dof()).filter(|j| self.moving[*j] && (all || rotors.contains(j))).collect()
+        };
+        if open.as_ref().is_none_or(|open| open.judged.leaves_any()) {
+            let joints = drives(&best);
+            best = tried(self.drive(best.chosen, &joints, progress)?)?;
+        }
+        if let Some(found) = open.take_if(|open| open.left() < best.left()) {
+            let joints = drives(&found);
+            open = Some(tried(self.drive(found.chosen, &joints, progress)?)?);
+        }
+        // What such a drive covered has its turn beside it.
+        if let (Some(laws), Some(turned)) = (laws, &best.chosen.turned)
+            && best.judged.leaves_any()
+            && best.left() > UNNOTICED
+            && let Some(beside) = self.beside(&best.chosen, turned, laws, progress)?
+        {
+            let beside = tried(beside)?;
+            let least = open.as_ref().map_or(f64::INFINITY, beyond).min(OPEN * beyond(&best));
+            open = if beyond(&beside) < least { Some(beside) } else { open };
+        }
+        if let Some(open) = open.filter(|open| open.left() < best.left()) {
+            // Beside laws that leave nothing but noise, noise is all that could tell an effect from itself.
+            let doubt = much && open.judged.leaves_any();
+            return self.constant(open.chosen, doubt, |_| true);
+        }
+        let constant = |Tried { chosen, judged, .. }: Tried| {
+            self.constant(chosen, judged.leaves_much(), |candidate| judged.doubts(&candidate.joints))
+        };
+        if best.kinds.is_empty() || !best.judged.spoils() {
+            return constant(best);
+        }
+        let modest = without(&REACHING)?;
+        if modest.kinds.is_empty() || !modest.judged.spoils() {
+            return constant(modest);
+        }
+        let choice = select::evaluate(&modest.chosen.all, Vec::new());
+        let (exact, fit) = self.data(&modest.chosen.noise).refine(&[])?;
+        Ok(Chosen { choice, exact, fit, ..modest.chosen })
     }
 
-    /// The likeliest account: where the best one without a kind is likelier than what was chosen, that one.
-    fn likeliest(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        for _ in 0..AGAIN {
-            let mut rivals = climb::rivals(&chosen.all, &chosen.choice);
-            rivals.sort_by(|a, b| a.odds.total_cmp(&b.odds));
-            let Some(rival) = rivals.into_iter().next().filter(|rival| rival.odds < 0.0) else { break };
-            let turned = chosen.turned.clone().filter(|turned| rival.choice.set.contains(&turned.place));
-            let next = self.converge(chosen.all.clone(), rival.choice, chosen.noise.clone(), turned, progress)?;
-            if next.odds_against(&chosen, self)? <= 0.0 {
-                break;
-            }
-            chosen = Chosen { tried: chosen.tried, ..next };
+    /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first, where much is left:
+    /// those in doubt by regime, all by what changes slowly and fast.
+    fn constant(
+        &self,
+        mut chosen: Chosen,
+        much: bool,
+        doubt: impl Fn(&Candidate) -> bool,
+    ) -> Result<Chosen, EffectError> {
+        while much
+            && let Some(&(worst, _)) =
+                constancy::inconsistent(&chosen.exact, &chosen.fit, &self.signals, &self.band, &doubt).first()
+        {
+            chosen.choice.set.remove(worst);
+            let (exact, fit) =
+                self.data(&chosen.noise).refine(&with_drive(&chosen.all, &chosen.choice.set, &chosen.turned))?;
+            let choice = select::evaluate(&chosen.all, chosen.choice.set);
+            chosen = Chosen { exact, fit, choice, ..chosen };
         }
         Ok(chosen)
     }
 
-    /// What was chosen without the kinds beyond calibration that the logs, held against the exact law, do not speak for.
-    fn needed(&self, mut chosen: Chosen) -> Result<Chosen, EffectError> {
-        let own = chosen.turned.as_ref().map(|turned| turned.place);
-        for kind in climb::kinds(&chosen.all, &chosen.choice.set) {
-            if kind.is_calibration() || kind.is_outside() {
-                continue;
-            }
-            let of_kind = |c: &usize| chosen.all.entries[*c].candidate.kind == kind && Some(*c) != own;
-            let set: Vec<usize> = chosen.choice.set.iter().copied().filter(|c| !of_kind(c)).collect();
-            let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
-            let without = Chosen {
-                all: chosen.all.clone(),
-                choice: Choice { set },
-                exact,
-                fit,
-                noise: chosen.noise.clone(),
-                turned: chosen.turned.clone(),
-                late_doubt: None,
-                tried: chosen.tried.clone(),
-                needed: chosen.needed.clone(),
-            };
-            let odds = chosen.odds_against(&without, self)?;
-            if odds <= 0.0 {
-                chosen = without;
-            } else {
-                chosen.needed.push((kind, odds));
-            }
+    /// The best set without some kinds; limits have no place in it where they leave much of what they cut.
+    fn choose_among(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let chosen = self.best_of(forbidden, &weighing(), progress)?;
+        if limits::hold(&chosen) {
+            return Ok(chosen);
         }
-        Ok(chosen)
+        self.best_of(&[forbidden, &[Kind::TorqueSaturation]].concat(), &weighing(), progress)
     }
 
-    /// The best set of rigid drives.
-    fn best_of(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+    /// The best set without some kinds, rows weighed by what all those of others leave.
+    fn best_of(&self, forbidden: &[Kind], weighed_by: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let residuals: Vec<Vec<Vec<f64>>> = self
             .signals
             .par_iter()
             .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
             .collect();
-        let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof());
+        let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof(), 0.0);
         let data = self.data(&noise);
         let mut candidates = Candidate::all(self.model);
         let ranges = ranges(self.model, &self.signals);
         candidates.extend(Candidate::knobs(&ranges));
         let limits = self.limits(&ranges);
-        // What acts on the effort is told by the torque that the motion takes: of a used arm, not that of its URDF.
-        let term = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
-        let calibration: Vec<Term> = candidates.iter().filter(|c| c.kind.is_calibration()).map(term).collect();
-        let at: Vec<usize> = (0..calibration.len()).collect();
-        let calibrated = data.problem(calibration, &Kind::ALL);
-        let at: Vec<usize> = at.into_iter().take(calibrated.entries.len()).collect();
-        let loaded = data.loaded(&calibrated, &Fit::on_all(&calibrated, &at))?;
-        let data = Data { signals: &loaded, ..data };
         candidates.retain(|c| c.kind != Kind::TorqueSaturation || limits[c.joints[0]].contains(&c.shape));
-        let outside = Candidate::outside(self.model);
+        let open = Kind::OUTSIDE.iter().any(|kind| !forbidden.contains(kind));
+        let outside = if open { Candidate::outside(self.model) } else { Vec::new() };
         candidates.extend(screen::ripples(&data, &ranges, &residuals, &outside));
-        candidates.extend(screen::places(&data, &ranges, &residuals, &outside));
+        if open {
+            candidates.extend(screen::places(&data, &ranges, &residuals, &outside));
+        }
         candidates.extend(outside);
         if self.signals.iter().any(|s| !s.pushed.is_empty()) {
             candidates.extend(Candidate::contacts(self.model));
         }
-        let mut all = data.problem(candidates.iter().map(term).collect(), &weighing());
+        candidates.retain(|c| !forbidden.contains(&c.kind));
+        let term = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
+        let mut all = data.problem(candidates.iter().map(term).collect(), weighed_by);
         progress("choosing effects", 0.2);
-        let choice = climb::choose(&mut all, &self.band, &[]);
-        self.converge(all, choice, noise, None, progress)
+        let choice = select::choose(&mut all, &self.band, &[]);
+        self.converge(all, choice.set, noise, None, progress)
     }
 
     /// From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
     pub(crate) fn converge(
         &self,
         mut all: Problem,
-        mut choice: Choice,
+        set: Vec<usize>,
         noise: Vec<f64>,
         turned: Option<Turned>,
         progress: Progress<'_>,
     ) -> Result<Chosen, EffectError> {
         let data = self.data(&noise);
         let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
+        let mut choice = select::evaluate(&all, set);
         let mut round = 0;
         loop {
             progress("refining effects", 0.3 + 0.08 * round as f64);
@@ -219,22 +285,12 @@ impl Logs<'_> {
                 .map(|(&c, e)| (c, e.candidate.clone()))
                 .collect();
             if round == ROUNDS || choice.set.is_empty() {
-                return Ok(Chosen {
-                    all,
-                    choice,
-                    exact,
-                    fit,
-                    noise,
-                    turned,
-                    late_doubt: None,
-                    tried: Vec::new(),
-                    needed: Vec::new(),
-                });
+                return Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt: None });
             }
             // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
             let loaded = data.loaded(&exact, &fit)?;
             let data = Data { signals: &loaded, ..data };
-            let of_load = |(_, e): &(usize, &Entry)| e.candidate.reads_torque();
+            let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind == Kind::LoadDependentFriction;
             let under_load = all.entries.iter().enumerate().filter(of_load);
             let changes: Vec<(usize, Candidate)> =
                 under_load.map(|(c, e)| (c, e.candidate.clone())).chain(changes).collect();
@@ -245,21 +301,11 @@ impl Logs<'_> {
             carry(&fit, &exact, &plain, &mut plain_fit);
             let curvature = data.curvature(&plain, &plain_fit)?;
             all.bend(&self.signals, &self.band, &self.still, &curvature);
-            let again = climb::choose(&mut all, &self.band, &choice.set);
+            let again = select::choose(&mut all, &self.band, &choice.set);
             let same = again.set == choice.set;
             choice = again;
             if same {
-                return Ok(Chosen {
-                    all,
-                    choice,
-                    exact,
-                    fit,
-                    noise,
-                    turned,
-                    late_doubt: None,
-                    tried: Vec::new(),
-                    needed: Vec::new(),
-                });
+                return Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt: None });
             }
         }
     }

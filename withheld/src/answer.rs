@@ -1,5 +1,6 @@
 //! What a diagnoser answered, read as leniently as the judging allows, so that any binary can be scored.
 
+use crate::truth::Part;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
@@ -25,6 +26,9 @@ pub struct Named {
     /// Joints affected.
     #[serde(default)]
     pub joints: Vec<String>,
+    /// Whether it is calibration or something further, where the answer says so.
+    #[serde(default)]
+    pub part: Option<Part>,
     /// Probability that the effect is there.
     #[serde(default = "sure")]
     pub confidence: f64,
@@ -53,6 +57,22 @@ impl Named {
             _ => None,
         });
         (found.get("value").and_then(Value::as_f64), interval)
+    }
+}
+
+impl Named {
+    /// 95 % intervals of a parameter at a joint, or of a robot-wide one: one for a number, one for each component of a vector;
+    /// none where they are not given.
+    pub fn intervals(&self, name: &str, joint: &str) -> Vec<[f64; 2]> {
+        let Some(found) = self.parameters.get(name) else { return vec![] };
+        let found = found.get(joint).unwrap_or(found);
+        match found.get("ci95").and_then(Value::as_array).map(Vec::as_slice) {
+            Some([Value::Array(from), Value::Array(to)]) => {
+                from.iter().zip(to).filter_map(|(from, to)| Some([from.as_f64()?, to.as_f64()?])).collect()
+            }
+            Some([from, to]) => from.as_f64().zip(to.as_f64()).map(<[f64; 2]>::from).into_iter().collect(),
+            _ => vec![],
+        }
     }
 }
 

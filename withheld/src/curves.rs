@@ -1,7 +1,7 @@
 //! How often an answer is right, by what it says itself and by what there was to see.
 
 use crate::score::{CaseScore, counted};
-use crate::statistics::{mean, share_interval};
+use crate::statistics::{mean, rounded, share_interval};
 use crate::truth::is_unknown;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -56,6 +56,12 @@ pub(crate) fn calibration(cases: &[CaseScore]) -> Vec<CalibrationBin> {
     (0..BINS).filter_map(bin).collect()
 }
 
+/// Expected calibration error of so many confidences in their bins, to four decimals; `None` of none.
+pub(crate) fn expected_error(bins: &[CalibrationBin], reported: usize) -> Option<f64> {
+    let part = |bin: &CalibrationBin| bin.n as f64 / reported as f64 * (bin.confidence - bin.right).abs();
+    (reported > 0).then(|| rounded(bins.iter().map(part).sum(), 4))
+}
+
 /// Sealed effects of the catalogue found, by their visibility; empty bins are left out.
 pub(crate) fn visibility(cases: &[CaseScore]) -> Vec<VisibilityBin> {
     let sealed = cases.iter().flat_map(|case| {
@@ -102,6 +108,7 @@ mod tests {
             judgement,
             seconds: 1.0,
             error: None,
+            arm: None,
         }
     }
 

@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// Kinds that may honestly be reported beside the first: its physics contains them.
-const IMPLIES: [(&str, &[&str]); 5] = [
+pub(crate) const IMPLIES: [(&str, &[&str]); 5] = [
     ("stribeck_friction", &["coulomb_friction"]),
     ("presliding_friction", &["coulomb_friction"]),
     ("thermal_drift", &["coulomb_friction"]),
@@ -16,7 +16,7 @@ const IMPLIES: [(&str, &[&str]); 5] = [
 ];
 
 /// Kinds without joints to name, with one value for the robot.
-const ROBOT_WIDE: [&str; 5] =
+pub(crate) const ROBOT_WIDE: [&str; 5] =
     ["payload", "gravity_misalignment", "actuation_delay", "actuator_lag", "external_contact"];
 
 /// Parameters with one value per affected joint: name in the truth, public name.

@@ -6,6 +6,8 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod answer;
+mod arm;
+mod arm_totals;
 mod case;
 mod curves;
 mod draw;
@@ -14,12 +16,15 @@ mod outside;
 mod plan;
 mod robot;
 mod score;
+mod sight;
 mod statistics;
 mod truth;
 mod used;
 mod visibility;
 
 pub use answer::{Answer, Named};
+pub use arm::{ArmJudgement, impossible_bodies, judge_arm};
+pub use arm_totals::{ArmTotals, Middle, Rate};
 pub use case::{Case, CaseError, CaseSpec, make_case};
 pub use curves::{CalibrationBin, VisibilityBin};
 pub use draw::{Difficulty, Sort, UNKNOWN};

@@ -1,6 +1,8 @@
 //! The judgements of whole banks in figures.
 
-use crate::curves::{CalibrationBin, VisibilityBin, calibration, visibility};
+use crate::arm::ArmJudgement;
+use crate::arm_totals::{ArmTotals, arm_totals};
+use crate::curves::{CalibrationBin, VisibilityBin, calibration, expected_error, visibility};
 use crate::judge::Judgement;
 use crate::statistics::{mean_rounded, median, rounded};
 use crate::truth::{Group, SealedEffect, Truth, is_unknown};
@@ -24,6 +26,9 @@ pub struct Score {
     pub calibration: Vec<CalibrationBin>,
     /// Sealed effects of the catalogue found, by their visibility; empty bins are left out.
     pub visibility: Vec<VisibilityBin>,
+    /// The figures over used arms, by how used they are; nothing where there are none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub arms: Vec<ArmTotals>,
     /// Case by case.
     pub cases: Vec<CaseScore>,
 }
@@ -50,6 +55,9 @@ pub struct CaseScore {
     pub seconds: f64,
     /// Why there is no answer.
     pub error: Option<String>,
+    /// How the answer did on a used arm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arm: Option<ArmJudgement>,
 }
 
 /// Figures over all cases. Means and medians are over all groups but the undetectable, and `None` over nothing.
@@ -128,7 +136,15 @@ impl CaseScore {
             judgement,
             seconds,
             error,
+            arm: None,
         }
+    }
+
+    /// The same with what the answer comes to on a used arm.
+    #[must_use]
+    pub fn on_arm(mut self, arm: Option<ArmJudgement>) -> CaseScore {
+        self.arm = arm;
+        self
     }
 
     /// What the answer says first: a kind, a verdict, or `error`.
@@ -147,7 +163,8 @@ impl Score {
             .collect();
         let (calibration, visibility) = (calibration(&cases), visibility(&cases));
         let totals = totals(&cases, &calibration);
-        Score { schema: SCORE_SCHEMA.to_owned(), totals, banks, calibration, visibility, cases }
+        let arms = arm_totals(&cases);
+        Score { schema: SCORE_SCHEMA.to_owned(), totals, banks, calibration, visibility, arms, cases }
     }
 
     /// Labels and counts of sealed effect against the one named first; the catalogue's order, then none, unknown and what
@@ -224,10 +241,7 @@ fn totals(cases: &[CaseScore], calibration: &[CalibrationBin]) -> Totals {
         param_reported: shares(params.iter().map(|p| p.error.is_some()).collect()),
         gain_abs_err_median: median(errors(true)).map(|m| rounded(m, 5)),
         interval_coverage: shares(params.iter().filter_map(|p| p.covered).collect()),
-        calibration_error: (reported > 0).then(|| {
-            let part = |bin: &CalibrationBin| bin.n as f64 / reported as f64 * (bin.confidence - bin.right).abs();
-            rounded(calibration.iter().map(part).sum(), 4)
-        }),
+        calibration_error: expected_error(calibration, reported),
         reported_effects: reported,
         shrink_abs_err_mean: mean_rounded(&counted(cases).filter_map(|j| j.shrink_err).collect::<Vec<f64>>()),
         seconds_median: median(cases.iter().map(|case| case.seconds).collect()).map(|m| rounded(m, 2)),

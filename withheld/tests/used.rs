@@ -35,7 +35,7 @@ fn cases(used: Used, arms: usize, robot: &Robot) -> Vec<Case> {
     plan(used, arms).specs().iter().map(|spec| make_case(robot, spec).unwrap_or_else(|e| panic!("{e}"))).collect()
 }
 
-fn effect<'a>(truth: &'a Truth, kind: Kind) -> Option<&'a SealedEffect> {
+fn effect(truth: &Truth, kind: Kind) -> Option<&SealedEffect> {
     truth.effects.iter().find(|effect| effect.kind == kind.name())
 }
 

@@ -146,6 +146,21 @@ fn sensors_err_as_they_say() {
     };
     let noise = differs(Sensors { effort_noise: 0.02, ..Sensors::IDEAL });
     assert!((noise / 0.02 - 1.0).abs() < 0.03, "{noise}");
+    // What is left of one sample's noise at the next: e^{−dt/time}.
+    let slow = log(Sensors { effort_noise: 0.02, effort_noise_time: 0.01, ..Sensors::IDEAL });
+    let noise: Vec<f64> = slow.effort[0].iter().zip(&ideal.effort[0]).map(|(a, b)| a - b).collect();
+    assert!((rms(noise.iter().copied()) / size / 0.02 - 1.0).abs() < 0.08);
+    let kept = noise.windows(2).map(|n| n[0] * n[1]).sum::<f64>() / noise.iter().map(|n| n * n).sum::<f64>();
+    assert!((kept - (-0.2f64).exp()).abs() < 0.03, "{kept}");
+    let current = log(Sensors { effort_step: 0.05, ..Sensors::IDEAL });
+    let off = |e: &f64| (e / (0.05 * size) - (e / (0.05 * size)).round()).abs();
+    assert!(current.effort[0].iter().all(|e| off(e) < 1e-6));
+    // The servo does not feel how the log rounds.
+    let counts = log(Sensors { log_step: step, velocity_cutoff: Some(50.0), ..Sensors::IDEAL });
+    assert_eq!(counts.effort, ideal.effort);
+    for (counted, q) in counts.position[0].iter().zip(&ideal.position[0]) {
+        assert!((counted - q).abs() <= 0.5 * step * (1.0 + 1e-9));
+    }
     let ripple = differs(Sensors { effort_ripple: 0.02, ..Sensors::IDEAL });
     assert!((ripple * 2f64.sqrt() / 0.02 - 1.0).abs() < 0.1, "{ripple}");
 
@@ -183,6 +198,7 @@ fn numbers_that_cannot_be_are_errors() {
     let recipe = Recipe::default();
     fails(Recipe { rate: 0.0, ..recipe }, "rate");
     fails(Recipe { rate: f64::NAN, ..recipe }, "rate");
+    fails(Recipe { substeps: 0, ..recipe }, "substeps");
     fails(Recipe { seconds: 1e9, ..recipe }, "seconds");
     fails(Recipe { seconds: -1.0, ..recipe }, "seconds");
     fails(Recipe { sensors: Sensors { dropped: 1.0, ..Sensors::IDEAL }, ..recipe }, "dropped");

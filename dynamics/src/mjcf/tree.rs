@@ -64,6 +64,9 @@ struct Walk<'a> {
     findings: Vec<Finding>,
 }
 
+/// Elements of a body that count for its motion, and that a frame would move.
+const MOVES: [&str; 3] = ["joint", "freejoint", "inertial"];
+
 impl Walk<'_> {
     /// What stands in a body, or in a frame of it, that lies at `place` in the link that `carrier` moves.
     fn inside(
@@ -77,6 +80,13 @@ impl Walk<'_> {
         for child in &element.children {
             match child.kind.as_str() {
                 "body" => self.body(child, carrier, place, class, in_world)?,
+                "frame" if child.children.iter().any(|inner| MOVES.contains(&inner.kind.as_str())) => {
+                    return Err(MjcfError::new(
+                        "a joint or an inertial inside a <frame> is not read",
+                        "Move it out of the frame, or save the compiled model (mj_saveLastXML) and give that",
+                    )
+                    .at(child));
+                }
                 "frame" => {
                     let inner = place.compose(&placement(child, self.settings)?);
                     self.inside(child, carrier, inner, child.get("childclass").or(class), in_world)?;

@@ -101,6 +101,7 @@ fn what_the_model_cannot_hold_is_refused_by_name_with_the_mend() {
         (body("<joint damping=\"x\"/><geom size=\"1\"/>"), "damping"),
         (body("<geom size=\"1\"/>"), "no hinge"),
         (body("<replicate count=\"3\"/>"), "<replicate>"),
+        (body("<frame pos=\"1 0 0\"><joint/></frame><geom size=\"1\"/>"), "inside a <frame>"),
         (with("<include file=\"none.xml\"/>"), "none.xml"),
         ("<robot/>".into(), "<mujoco>"),
         ("<mujoco>".into(), "well-formed"),

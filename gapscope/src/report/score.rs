@@ -9,7 +9,7 @@ use super::chart::{Plot, dots, line};
 use super::format::{NONE, count, figure, percent};
 use super::{page, words};
 use crate::picture::inline;
-use figures::{misses, table};
+use figures::{Table, misses, table};
 use gapscope_withheld::{Group, Score};
 use maud::{Markup, html};
 
@@ -25,7 +25,10 @@ pub fn html(score: &Score) -> String {
             h1 { (single) " of single effects named exactly" }
         }
         main {
-            (section("How often it is right", "", totals(score)))
+            (section("How often it is right", "", rows(&table(score))))
+            @if let Some(arms) = figures::arms(score) {
+                (section("Used arms", "Friction, links, rotors and biases are off on most of them, and one further effect may be beside that; 95 % intervals in brackets.", rows(&arms)))
+            }
             (section("Which is taken for which", "Sealed effect by row, the one named first by column; one effect, or none, a case.",
                 html! { div.scroll tabindex="0" role="region" aria-label="Confusion matrix" { (inline(&pictures::confusion(score))) } }))
             (section("Confidence", "Share of the effects named with some confidence that are there; on the line, the confidence means what it says.",
@@ -40,8 +43,7 @@ pub fn html(score: &Score) -> String {
     page("withheld cases", &content, &score.schema)
 }
 
-fn totals(score: &Score) -> Markup {
-    let table = table(score);
+fn rows(table: &Table) -> Markup {
     html! {
         table.plain {
             thead { tr { th { } @for name in &table.columns { th.number { (name) } } } }

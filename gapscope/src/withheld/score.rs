@@ -5,7 +5,8 @@ use super::{progress, table};
 use crate::cli::ScoreBank;
 use crate::{output, report};
 use anyhow::{Context, Result, bail};
-use gapscope_withheld::{Answer, CaseScore, Score, judge};
+use gapscope_dynamics::Model;
+use gapscope_withheld::{Answer, CaseScore, Score, impossible_bodies, judge, judge_arm};
 use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -63,7 +64,8 @@ pub fn run(args: &ScoreBank) -> Result<String> {
     let judged = cases.iter().zip(trials).map(|(case, trial)| {
         let truth = case.truth()?;
         let judgement = judge(&truth, trial.answer.as_ref(), trial.evaluation.as_ref());
-        Ok(CaseScore::new([&case.bank, &case.name], &truth, judgement, trial.seconds, trial.error))
+        let arm = judge_arm(&truth, trial.answer.as_ref(), &judgement, trial.impossible);
+        Ok(CaseScore::new([&case.bank, &case.name], &truth, judgement, trial.seconds, trial.error).on_arm(arm))
     });
     let score = Score::new(judged.collect::<Result<_>>()?);
     let json = serde_json::to_string_pretty(&score)?;
@@ -89,6 +91,8 @@ pub fn run(args: &ScoreBank) -> Result<String> {
 struct Trial {
     answer: Option<Answer>,
     evaluation: Option<Value>,
+    /// Links that its corrected model turns into what no body can be.
+    impossible: Option<usize>,
     /// Time of the diagnosis, s.
     seconds: f64,
     error: Option<String>,
@@ -119,15 +123,23 @@ impl Trial {
                 return Ok(trial);
             }
         }
+        let corrected = out.join("corrected.json");
+        trial.impossible = impossible(&robot, &corrected);
         let mut evaluate = Command::new(exe);
         evaluate.arg("evaluate").arg(&robot).args(case.tests()?);
-        evaluate.arg("--with").arg(out.join("corrected.json")).arg("--json");
+        evaluate.arg("--with").arg(corrected).arg("--json");
         if finish(&mut evaluate, scratch.path(), limit)?.is_some_and(|status| status.success()) {
             let text = std::fs::read_to_string(stdout(scratch.path())).unwrap_or_default();
             trial.evaluation = serde_json::from_str(&text).ok();
         }
         Ok(trial)
     }
+}
+
+/// Links of a corrected model that no body can be; `None` where a file cannot be read.
+fn impossible(robot: &Path, corrected: &Path) -> Option<usize> {
+    let model = Model::from_urdf(&std::fs::read_to_string(robot).ok()?).ok()?.model;
+    impossible_bodies(&model, &serde_json::from_str(&std::fs::read_to_string(corrected).ok()?).ok()?)
 }
 
 fn stdout(scratch: &Path) -> PathBuf {

@@ -1,6 +1,6 @@
 //! A score as text.
 
-use crate::report::score::figures::table;
+use crate::report::score::figures::{Table, arms, table};
 use crate::report::terminal::{column, fill, pad};
 use gapscope_withheld::Score;
 use std::fmt::Write;
@@ -10,20 +10,31 @@ const NAMES: usize = 24;
 /// Most columns of the name of a bank.
 const BANK: usize = 16;
 
-/// The figures of a score and its confusion matrix.
-pub fn score(score: &Score) -> String {
-    let table = table(score);
+/// Most columns of a figure of used arms.
+const ARM: usize = 24;
+
+/// A table's head and rows, its cells cut to a width.
+fn rows(table: &Table, most: usize) -> String {
     let names = column(table.rows.iter().map(|row| row.0), 60) + 2;
-    let width = column(table.rows.iter().flat_map(|row| &row.1).chain(&table.columns).map(String::as_str), BANK) + 3;
-    // Writing to a string cannot fail.
+    let width = column(table.rows.iter().flat_map(|row| &row.1).chain(&table.columns).map(String::as_str), most) + 3;
     let line = |name: &str, cells: &[String]| -> String {
-        let cells: String = cells.iter().map(|cell| fill(pad(cell, BANK).trim_end(), width)).collect();
+        let cells: String = cells.iter().map(|cell| fill(pad(cell, most).trim_end(), width)).collect();
         format!("{}{cells}\n", pad(name, names))
     };
     let mut text = line("", &table.columns);
     for (name, cells) in &table.rows {
         text.push_str(&line(name, cells));
     }
+    text
+}
+
+/// The figures of a score and its confusion matrix.
+pub fn score(score: &Score) -> String {
+    let mut text = rows(&table(score), BANK);
+    if let Some(arms) = arms(score) {
+        text.push_str(&format!("\nUsed arms (95 % intervals in brackets)\n{}", rows(&arms, ARM)));
+    }
+    // Writing to a string cannot fail.
     let (labels, counts) = score.confusion_matrix();
     if !labels.is_empty() {
         let _ = writeln!(text, "\nSealed effect (rows) against the one named first (columns)");

@@ -149,6 +149,8 @@ fn settings_that_make_no_bank_are_refused_and_leave_nothing() {
         (vec!["--episodes", "0"], vec!["--episodes"]),
         (vec!["--tests", "0"], vec!["--tests"]),
         (vec!["--robots", "arm9"], vec!["arm9", "arm7"]),
+        (vec!["--used", "--none", "1"], vec!["--used", "--cases"]),
+        (vec!["--used", "2", "--cases", "0"], vec!["no case"]),
     ] {
         refused(&make(&bank, &args, "1"), &words);
         assert!(!bank.exists() && !sealed(&bank).exists(), "{args:?}");
@@ -192,6 +194,33 @@ fn a_bank_is_scored() {
     refused(&score(&bank, &["--out", out.to_str().unwrap()]), &["score.html", "--force"]);
     fs::write(out.join("score.json"), scored.stdout.trim_ascii_end()).unwrap();
     assert_eq!(fs::read(out.join("score.json")).unwrap(), scored.stdout.trim_ascii_end());
+}
+
+#[test]
+fn used_arms_are_made_and_counted_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let bank = folder.path().join("bank");
+    let args = ["--used", "2", "--cases", "2", "--robots", "double_pendulum", "--seconds", "3", "--episodes", "1"];
+    let made = make(&bank, &args, "2");
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    for i in 0..2 {
+        let head = fs::read_to_string(bank.join(format!("case_00{i}/episode_0.csv"))).unwrap();
+        assert!(head.lines().next().unwrap().contains("velocity."));
+        let truth = fs::read_to_string(sealed(&bank).join(format!("case_00{i}/truth.json"))).unwrap();
+        let truth: Value = serde_json::from_str(&truth).unwrap();
+        assert_eq!(truth["used"], 2);
+        let parts = truth["effects"].as_array().unwrap().iter().map(|effect| effect["part"].as_str().unwrap());
+        assert!(parts.filter(|part| *part == "further").count() < 2);
+    }
+    let out = folder.path().join("out");
+    let scored = score(&bank, &["--exe", "/bin/false", "--json", "--out", out.to_str().unwrap()]);
+    let json: Value = serde_json::from_slice(&scored.stdout).unwrap();
+    assert_eq!((&json["arms"][0]["used"], &json["arms"][0]["n"]), (&2.into(), &2.into()));
+    assert_eq!(json["arms"][0]["impossible"], Value::Null);
+    for page in ["score.html", "score.md"] {
+        let page = fs::read_to_string(out.join(page)).unwrap();
+        assert!(page.contains("Used arms") && page.contains("used 2"));
+    }
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! The figures of a score as text: a table with a column for each bank and one for all, and what was missed.
 
-use super::super::format::{NONE, figure, percent};
+use super::super::format::{NONE, figure, percent, percent_interval};
 use super::super::words;
-use gapscope_withheld::{CaseScore, Group, Score, Totals};
+use gapscope_withheld::{ArmTotals, CaseScore, Group, Middle, Rate, Score, Totals};
 
 /// Names of the figures and, for each bank and for all, what they are.
 #[derive(Debug)]
@@ -53,6 +53,46 @@ fn figures(t: &Totals) -> Vec<(&'static str, String)> {
         ("confidence: expected calibration error", number(t.calibration_error)),
         ("predicted shrink off by, mean", number(t.shrink_abs_err_mean)),
         ("time of a diagnosis, median, s", number(t.seconds_median)),
+    ]
+}
+
+/// The table of used arms, a column for each level of use; `None` where there are none.
+pub fn arms(score: &Score) -> Option<Table> {
+    let figures: Vec<Vec<(&'static str, String)>> = score.arms.iter().map(arm).collect();
+    let rows = figures.first()?.iter().enumerate();
+    let rows = rows.map(|(i, (name, _))| (*name, figures.iter().map(|own| own[i].1.clone()).collect()));
+    Some(Table { columns: score.arms.iter().map(|arms| arms.used.name().to_owned()).collect(), rows: rows.collect() })
+}
+
+fn arm(t: &ArmTotals) -> Vec<(&'static str, String)> {
+    let rate = |rate: &Option<Rate>| {
+        let text = |r: &Rate| format!("{} of {} ({})", percent(r.share()), r.of, percent_interval(r.ci95));
+        rate.as_ref().map_or(NONE.into(), text)
+    };
+    let part =
+        |middle: &Option<Middle>| middle.as_ref().map_or(NONE.into(), |m| format!("{} of {}", percent(m.value), m.of));
+    let middle =
+        |middle: &Option<Middle>| middle.as_ref().map_or(NONE.into(), |m| format!("{} of {}", figure(m.value), m.of));
+    let seconds = |seconds: Option<f64>| seconds.map_or(NONE.into(), figure);
+    vec![
+        ("arms", t.n.to_string()),
+        ("kinds and verdict exact, or a tie that it declares", rate(&t.exact_or_tie)),
+        ("  with ties counted wrong", rate(&t.exact)),
+        ("further effect named, on its joint", rate(&t.further_named)),
+        ("further kinds named that are not there, a case", middle(&t.invented)),
+        ("nothing further named where nothing is", rate(&t.nothing_further)),
+        ("unknown flagged", rate(&t.unknown_flagged)),
+        ("  where none is", rate(&t.unknown_claimed)),
+        ("95 % intervals shown that hold the truth", rate(&t.intervals)),
+        ("median error of friction", part(&t.friction_error)),
+        ("  of rotors", part(&t.rotor_error)),
+        ("  of biases", part(&t.bias_error)),
+        ("  of the further effect", part(&t.further_error)),
+        ("predicted shrink off by, mean", middle(&t.shrink_error)),
+        ("confidence: expected calibration error", middle(&t.calibration_error)),
+        ("arms with a link that no body can be", rate(&t.impossible)),
+        ("time of a diagnosis, median, s", seconds(t.seconds_median)),
+        ("  slowest, s", seconds(t.seconds_slowest)),
     ]
 }
 

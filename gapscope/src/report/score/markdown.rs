@@ -1,6 +1,6 @@
 //! A score as a page of documentation, its pictures in files beside it.
 
-use super::figures::{misses, table};
+use super::figures::{Table, arms, misses, table};
 use gapscope_withheld::{DETECTABLE, Score};
 use std::fmt::Write;
 
@@ -11,16 +11,18 @@ pub fn page(score: &Score, call: &str, pictures: [&str; 3]) -> String {
     let mut text = format!(
         "# Withheld cases\n\n`{call}` diagnosed {} cases whose effects are sealed, and opened the truth once every answer was given. *Exact*: \
          the set of effects is the sealed one and the verdict is right. A *declared tie* is an effect named as one that the logs cannot \
-         tell from the sealed one.\n\n| | {} |\n|---|{}\n",
+         tell from the sealed one.\n\n{}",
         score.cases.len(),
-        table.columns.join(" | "),
-        "---|".repeat(table.columns.len()),
+        rows(&table),
     );
-    // Writing to a string cannot fail.
-    for (name, cells) in &table.rows {
-        let name = name.strip_prefix("  ").map_or_else(|| (*name).to_owned(), |name| format!("… {name}"));
-        let _ = writeln!(text, "| {name} | {} |", cells.join(" | "));
+    if let Some(arms) = arms(score) {
+        text.push_str(
+            "\n## Used arms\n\nFriction, links, rotors and biases are off on most of them, and one further effect may be beside that. Shares say \
+             of how many, with their 95 % score interval (Wilson); means and medians say of how many values.\n\n",
+        );
+        text.push_str(&rows(&arms));
     }
+    // Writing to a string cannot fail.
     let _ = write!(
         text,
         "\n## Which effect is taken for which\n\n![Sealed effect against the one named first]({confusion})\n\n\
@@ -56,4 +58,14 @@ pub fn page(score: &Score, call: &str, pictures: [&str; 3]) -> String {
         let _ = writeln!(text, "| {cells} | {} |", miss.counts);
     }
     text.replace('\u{202f}', "\u{a0}")
+}
+
+/// A table's head and rows.
+fn rows(table: &Table) -> String {
+    let mut text = format!("| | {} |\n|---|{}\n", table.columns.join(" | "), "---|".repeat(table.columns.len()));
+    for (name, cells) in &table.rows {
+        let name = name.strip_prefix("  ").map_or_else(|| (*name).to_owned(), |name| format!("… {name}"));
+        text.push_str(&format!("| {name} | {} |\n", cells.join(" | ")));
+    }
+    text
 }

@@ -8,7 +8,9 @@ mod signal;
 mod units;
 mod velocity;
 
+pub(crate) use effort::{Fit, fit};
 pub(crate) use signal::Traits;
+pub(crate) use velocity::Relation;
 
 use crate::episode::Episode;
 use gapscope_dynamics::{Finding, Model};
@@ -43,19 +45,19 @@ pub fn check_logs(model: &Model, episodes: &[Episode]) -> Vec<Finding> {
 }
 
 /// The logs with what several rules ask of them.
-struct Logs<'a> {
-    model: &'a Model,
-    episodes: &'a [&'a Episode],
+pub(crate) struct Logs<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) episodes: &'a [&'a Episode],
     /// Median step of time of each episode, s.
-    dt: Vec<f64>,
+    pub(crate) dt: Vec<f64>,
     /// `[episode][joint]`.
-    traits: Vec<Vec<signal::Traits>>,
+    pub(crate) traits: Vec<Vec<signal::Traits>>,
     /// `[episode][joint]`, where there is a velocity and the joint moves.
-    relations: Vec<Vec<Option<velocity::Relation>>>,
+    pub(crate) relations: Vec<Vec<Option<velocity::Relation>>>,
 }
 
 impl<'a> Logs<'a> {
-    fn new(model: &'a Model, episodes: &'a [&'a Episode]) -> Self {
+    pub(crate) fn new(model: &'a Model, episodes: &'a [&'a Episode]) -> Self {
         let dt: Vec<f64> = episodes.iter().map(|episode| episode.dt()).collect();
         let of = |(episode, dt): (&&Episode, &f64)| {
             episode.position.iter().map(|position| signal::Traits::of(&episode.time, position, *dt)).collect()
@@ -67,11 +69,11 @@ impl<'a> Logs<'a> {
     }
 
     /// Unit of a joint's position.
-    fn unit(&self, joint: usize) -> &'static str {
+    pub(crate) fn unit(&self, joint: usize) -> &'static str {
         if self.is_prismatic(joint) { "m" } else { "rad" }
     }
 
-    fn is_prismatic(&self, joint: usize) -> bool {
+    pub(crate) fn is_prismatic(&self, joint: usize) -> bool {
         self.model.joints()[joint].kind == gapscope_dynamics::JointKind::Prismatic
     }
 }
@@ -128,7 +130,7 @@ impl Report<'_> {
 }
 
 /// A number with about three significant digits.
-fn figure(value: f64) -> String {
+pub(crate) fn figure(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }

@@ -31,16 +31,42 @@ pub(crate) fn parse(contents: &Contents, joints: &[String], options: &ReadOption
         notes.push(format!("the compressed data ends early: read up to row {}", line - 1));
         text = &text[..whole];
     }
-    let (delimiter, mut reader) = open(text);
+    let commented = comments(text);
+    let (delimiter, mut reader) = open(&text[commented..]);
     let header = header(&mut reader)?;
     let plan = plan(&header, joints, &options.map).map_err(|error| separator_hint(error, &header, delimiter))?;
     notes.extend(plan.notes.iter().cloned());
+    let text = (text, commented);
     let mut columns = Rows::new(text, &plan, delimiter, options).read(&mut reader, &mut notes)?;
+    if columns.lines.is_empty() {
+        return Err(LogError::new(LogErrorKind::Empty, "the file has a header and not one whole row")
+            .row(1)
+            .hint("Check whether the logger ran; a log has one row per sample"));
+    }
     Ok(Table { rows: std::mem::take(&mut columns.lines), episode: assemble(columns, &plan, joints), notes })
 }
 
 pub(crate) const ALLOW: &str =
     "Copy the file again, or say that logs may be truncated (--allow-truncated) to read up to there";
+
+/// Bytes of the comments at the start: lines that begin with `#`, but for one right above numbers, which is a header.
+fn comments(text: &[u8]) -> usize {
+    let mut start = 0;
+    while text[start..].starts_with(b"#") {
+        let Some(end) = text[start..].iter().position(|&byte| byte == b'\n' || byte == b'\r') else { break };
+        let mut next = start + end;
+        while matches!(text.get(next), Some(b'\n' | b'\r')) {
+            next += 1;
+        }
+        let cell = text[next..].split(|byte| b",;\t\r\n".contains(byte)).next().unwrap_or_default();
+        let number = std::str::from_utf8(cell).is_ok_and(|cell| cell.trim().parse::<f64>().is_ok());
+        if number || next >= text.len() {
+            break;
+        }
+        start = next;
+    }
+    start
+}
 
 fn open(text: &[u8]) -> (u8, Reader<&[u8]>) {
     let end = text.iter().position(|&byte| byte == b'\n' || byte == b'\r').unwrap_or(text.len());

@@ -23,6 +23,8 @@ pub(crate) struct Feed {
 pub(crate) struct Plan {
     /// Number of cells in a row.
     pub width: usize,
+    /// Whether the last column has no name: a separator behind each cell, which rows may lack.
+    pub trailing: bool,
     /// Time first, then the joints of each of `channels` in turn.
     pub feeds: Vec<Feed>,
     /// Channels that the file carries for every joint.
@@ -42,6 +44,7 @@ pub(crate) fn plan(columns: &[String], joints: &[String], map: &ColumnMap) -> Re
     used.insert(time.index);
     let mut plan = Plan {
         width: columns.len(),
+        trailing: columns.len() > 1 && columns.last().is_some_and(String::is_empty),
         feeds: vec![time],
         channels: Vec::new(),
         undisturbed: Vec::new(),
@@ -80,7 +83,11 @@ impl Header<'_> {
         if numbers > 0 && 2 * numbers > named.count() {
             return Err(LogError::new(LogErrorKind::NoHeader, "the first line holds numbers, not names of columns")
                 .row(1)
-                .hint(format!("Put a header above it: time,{}", self.native_names(Channel::Position))));
+                .hint(format!(
+                    "Put a header above it: time,{},{}",
+                    self.native_names(Channel::Position),
+                    self.native_names(Channel::Effort)
+                )));
         }
         Ok(())
     }
@@ -247,6 +254,30 @@ impl Header<'_> {
                 .row(1)
                 .column(&target);
         let near: Vec<String> = self.near(joint).into_iter().filter(|column| !native(&column)).collect();
+        // A joint's name may be misspelt; of other robots' joints the names are told.
+        let meant = |column: &&String| {
+            column.split_once('.').is_some_and(|(channel, other)| channel == name && misspelt(other, joint))
+        };
+        let strange = |column: &String| {
+            let (_, other) = column.split_once('.').filter(|(channel, _)| *channel == name)?;
+            (!self.joints.iter().any(|known| known.trim() == other)).then(|| other.to_owned())
+        };
+        let strangers: Vec<String> = self.columns.iter().filter_map(strange).collect();
+        if let Some(column) = self.columns.iter().find(meant) {
+            return error.hint(format!("If `{column}` is meant: --map \"{target}={column}\""));
+        }
+        if !strangers.is_empty() {
+            let mut hint = format!("The log has {name} of {}", list(&strangers, 8));
+            hint += &if strangers.len() == missing.len() && missing.len() == self.joints.len() {
+                format!(
+                    ": another robot's log, or other names; if the order is the same, --map \"{target}={name}.{}\" and so on",
+                    strangers[0]
+                )
+            } else {
+                ": check that the log belongs to this robot".to_owned()
+            };
+            return error.hint(hint);
+        }
         let foreign: Vec<String> = self
             .columns
             .iter()
@@ -303,6 +334,25 @@ impl Header<'_> {
             plan.notes.push(format!("columns that are not read: {}", list(&unread, 12)));
         }
     }
+}
+
+/// Whether a name is another but for one letter that is wrong, missing or too many, two that are exchanged, or case and signs.
+fn misspelt(name: &str, wanted: &str) -> bool {
+    let plain =
+        |text: &str| text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect::<Vec<char>>();
+    let (a, b) = (plain(name), plain(wanted));
+    if a == b || a.len() < 4 || a.len().abs_diff(b.len()) > 1 {
+        return a == b;
+    }
+    // Numbers tell joints apart: joint1 is not joint2 misspelt.
+    let digits = |text: &[char]| text.iter().filter(|c| c.is_ascii_digit()).copied().collect::<Vec<char>>();
+    let same = a.iter().zip(&b).take_while(|(a, b)| a == b).count();
+    let (rest_a, rest_b) = (&a[same..], &b[same..]);
+    let swapped =
+        rest_a.len() > 1 && rest_b.len() > 1 && rest_a[..2] == [rest_b[1], rest_b[0]] && rest_a[2..] == rest_b[2..];
+    let replaced = a.len() == b.len() && rest_a.get(1..) == rest_b.get(1..);
+    let added = rest_a.get(1..) == Some(rest_b) || rest_b.get(1..) == Some(rest_a);
+    digits(&a) == digits(&b) && (swapped || replaced || added)
 }
 
 /// The first `most` names, and how many more there are.

@@ -11,6 +11,8 @@ use std::borrow::Cow;
 /// All rows of a log's text, by the feeds of its plan.
 pub(crate) struct Rows<'a> {
     text: &'a [u8],
+    /// Bytes of `text` above the header.
+    above: usize,
     plan: &'a Plan,
     delimiter: u8,
     options: &'a ReadOptions,
@@ -39,9 +41,10 @@ struct Fault {
 }
 
 impl<'a> Rows<'a> {
-    pub fn new(text: &'a [u8], plan: &'a Plan, delimiter: u8, options: &'a ReadOptions) -> Self {
+    /// `text` with the number of its bytes above the header, which the reader does not see.
+    pub fn new((text, above): (&'a [u8], usize), plan: &'a Plan, delimiter: u8, options: &'a ReadOptions) -> Self {
         let ends_open = !matches!(text.last(), Some(b'\n' | b'\r'));
-        Self { text, plan, delimiter, options, ends_open, length: text.trim_ascii_end().len() }
+        Self { text, above, plan, delimiter, options, ends_open, length: text.trim_ascii_end().len() }
     }
 
     /// Reads the rows that follow the header.
@@ -51,8 +54,8 @@ impl<'a> Rows<'a> {
         let mut row = vec![0.0; self.plan.feeds.len()];
         let mut lines = Lines::new(self.text);
         while reader.read_byte_record(&mut record).map_err(|error| unreadable(&error))? {
-            let start = record.position().map_or(0, |position| position.byte() as usize);
-            let end = reader.position().byte() as usize;
+            let start = self.above + record.position().map_or(0, |position| position.byte() as usize);
+            let end = self.above + reader.position().byte() as usize;
             let line = lines.of(start);
             let last = end >= self.length;
             if columns.lines.is_empty() {
@@ -118,12 +121,17 @@ impl<'a> Rows<'a> {
         numbers: &mut [f64],
         spare: &mut dyn FnMut(&Feed, Channel, &LogError),
     ) -> Result<(), Fault> {
-        if record.len() != self.plan.width {
+        // Loggers that put a separator behind each cell make one cell more, or one more in the header alone.
+        let one_more = record.len() == self.plan.width + 1 && record.get(self.plan.width).is_some_and(is_blank);
+        let one_less = record.len() + 1 == self.plan.width && self.plan.trailing;
+        if record.len() != self.plan.width && !one_more && !one_less {
             let mut found = format!("the row has {} cells, the header {}", record.len(), self.plan.width);
             if record.iter().any(|cell| cell.contains(&b'\n')) {
                 found.push_str("; a quotation mark is not closed");
             }
-            let hint = if self.delimiter == b',' && record.len() > self.plan.width {
+            let hint = if record.iter().any(|cell| cell.starts_with(b"#")) {
+                "Leave out lines of comments below the header"
+            } else if self.delimiter == b',' && record.len() > self.plan.width {
                 "If numbers are written with a decimal comma, write them with a point"
             } else {
                 "Every row has one cell for each column of the header"
@@ -167,7 +175,11 @@ impl<'a> Rows<'a> {
             Some(_) => (LogErrorKind::NotFinite, format!("{} is not a number", shown(cell)), Cow::from(INVALID)),
             None if cell.is_empty() => (LogErrorKind::EmptyCell, "the cell is empty".to_owned(), Cow::from(INVALID)),
             None => {
-                let hint = if cell.contains(&b',') {
+                let hint = if cell == feed.column.as_bytes() {
+                    "The header stands here once more: leave this row out, or split the file where a new run starts"
+                } else if UNITS.contains(&String::from_utf8_lossy(cell).trim_matches(['[', ']', '(', ')'])) {
+                    "This row holds units: leave it out, and see that they are SI"
+                } else if cell.contains(&b',') {
                     "Write decimals with a point"
                 } else {
                     "Cells hold plain decimal numbers"
@@ -196,6 +208,16 @@ impl<'a> Rows<'a> {
         LogError::new(LogErrorKind::TimeNotIncreasing, found).hint(hint).column(&self.plan.feeds[0].column)
     }
 }
+
+fn is_blank(cell: &[u8]) -> bool {
+    cell.trim_ascii().is_empty()
+}
+
+/// What stands in a row of units.
+const UNITS: [&str; 20] = [
+    "s", "sec", "ms", "us", "ns", "rad", "deg", "m", "mm", "rad/s", "deg/s", "m/s", "mm/s", "Nm", "N m", "N*m", "N",
+    "A", "mA", "%",
+];
 
 const INVALID: &str = "Leave out the rows where a value is missing or invalid; a gap in time splits the episode";
 

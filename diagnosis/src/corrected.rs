@@ -29,6 +29,18 @@ pub struct Corrected {
     pub alignment: f64,
     /// The effects.
     pub effects: Vec<Effect>,
+    /// What it was made from; an extension of the schema.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_from: Option<Origin>,
+}
+
+/// Digests of the files that a correction was made from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Of the robot description.
+    pub robot: String,
+    /// Of each log.
+    pub logs: Vec<String>,
 }
 
 /// Why a corrected model cannot be used.

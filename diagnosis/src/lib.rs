@@ -13,6 +13,7 @@ mod constancy;
 mod contact;
 mod corrected;
 mod diagnose;
+mod doubt;
 mod drive;
 mod estimate;
 mod evaluate;
@@ -38,7 +39,7 @@ mod select;
 mod signals;
 mod verdict;
 
-pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};
+pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA, Origin};
 pub use diagnose::{Outcome, Progress, diagnose};
 pub use evaluate::{Predictions, evaluate};
 pub use experiment::FILE as NEXT_EXPERIMENT;

@@ -21,6 +21,8 @@ pub enum Command {
     Diagnose(Diagnose),
     /// Measure the gap on other logs, before and after the corrections that a diagnosis found
     Evaluate(Evaluate),
+    /// Look at logs: rate, gaps, jitter, steps and motion of each joint; with the robot also faults and what they determine
+    Inspect(Inspect),
     /// Show how the model's error grows over the horizon, beside what one-step errors and Jacobians allow
     Rollout(Rollout),
     /// Run a study of this project's own, as its documents show it
@@ -69,6 +71,9 @@ pub struct Input {
     /// Leave out logs that cannot be read instead of stopping
     #[arg(long)]
     pub skip_bad_logs: bool,
+    /// Take the logs as they are, where a wrong unit, sign, order, zero or clock was found
+    #[arg(long)]
+    pub as_logged: bool,
 }
 
 /// Arguments of `diagnose`.
@@ -83,6 +88,29 @@ pub struct Diagnose {
     /// Replace results that are in the folder already
     #[arg(long)]
     pub force: bool,
+}
+
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// Logs (CSV, also gzipped)
+    #[arg(required = true)]
+    pub logs: Vec<PathBuf>,
+    /// Robot description (URDF), to hold the logs against
+    #[arg(long, value_name = "URDF")]
+    pub model: Option<PathBuf>,
+    /// Read a column of another name, e.g. `position.joint1=/joint_states/j1/pos`; may be given several times
+    #[arg(long = "map", value_name = "NATIVE=COLUMN")]
+    pub map: Vec<String>,
+    /// Read column names from a TOML file
+    #[arg(long, value_name = "FILE")]
+    pub map_file: Option<PathBuf>,
+    /// Hold a joint of the URDF fixed at zero; may be given several times
+    #[arg(long = "lock", value_name = "JOINT")]
+    pub lock: Vec<String>,
+    /// Print one JSON object and nothing else
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `evaluate`.

@@ -58,6 +58,7 @@ pub fn run(args: &Demo) -> Result<String> {
         lock: vec![],
         allow_truncated: false,
         skip_bad_logs: false,
+        as_logged: false,
     };
     let mut outcome = with_progress(load(&input)?)?;
     outcome.evidence.robot_file = urdf.display().to_string();

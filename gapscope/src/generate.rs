@@ -278,6 +278,7 @@ mod tests {
             lock: vec![],
             allow_truncated: false,
             skip_bad_logs: false,
+            as_logged: false,
         };
         let loaded = crate::input::load(&input).unwrap();
         assert_eq!((loaded.episodes.len(), loaded.episodes[0].len()), (2, 600));

@@ -40,7 +40,11 @@ pub fn run(args: &Rollout) -> Result<String> {
         Some(file) => file.clone(),
         None => output::new_folder(first.parent().unwrap_or(std::path::Path::new("")), "rollout")?.join("rollout.html"),
     };
+    if let Some(folder) = page.parent() {
+        output::writable(folder)?;
+    }
     let loaded = load(&args.input)?;
+    loaded.warn();
     let contenders = contenders(args, &loaded.model)?;
     let options =
         RolloutOptions { horizon: args.horizon, tolerance: args.tolerance, fit: args.fit_start, starts: args.starts };
@@ -201,6 +205,7 @@ mod tests {
                 lock: vec![],
                 allow_truncated: false,
                 skip_bad_logs: false,
+                as_logged: false,
             },
             with: None,
             residual: None,

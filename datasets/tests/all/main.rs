@@ -5,6 +5,7 @@ mod bad_input;
 mod check_rules;
 #[path = "../common/mod.rs"]
 mod common;
+mod faults;
 mod fuzz;
 mod generate;
 mod real_logs;

@@ -96,6 +96,7 @@ fn input(folder: &Path, log: &str) -> Input {
         lock: vec![],
         allow_truncated: false,
         skip_bad_logs: false,
+        as_logged: false,
     }
 }
 

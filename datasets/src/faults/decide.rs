@@ -81,7 +81,15 @@ impl Decision<'_> {
                     Some(gravity) => self.model.clone().with_gravity(gravity),
                     None => self.model.clone(),
                 };
-                let (weighed, extra) = self.weighed(&model, &changed, active);
+                let (weighed, mut extra) = self.weighed(&model, &changed, active);
+                // A position and an effort that are both turned are one axis, not two things that are wrong.
+                if account.kind == Kind::Sign && extra > 0.0 {
+                    let scales = effort::first_scales(&model, &changed, active);
+                    let own = |j: usize| scales[j] == 1.0 || account.joints.contains(&j) && scales[j] < 0.0;
+                    if (0..n).all(own) {
+                        extra = 0.5 * COST;
+                    }
+                }
                 // What limits and velocity say counts as in the first look.
                 let beside = if account.kind == Kind::Clock && slow { 30.0 } else { 0.0 };
                 // Another size of gravity is another planet: a clock is the likelier account.

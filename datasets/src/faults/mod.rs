@@ -164,7 +164,8 @@ pub fn find_faults(model: &Model, episodes: &[Episode]) -> Faults {
         episodes.par_iter().map(|episode| search::is_healthy(model, &[episode])).collect()
     };
     let (mended_model, mended) = mend(model, episodes, &together.faults);
-    if healthy(&mended_model, &mended).iter().all(|healthy| *healthy) {
+    let once_mended = healthy(&mended_model, &mended);
+    if once_mended.iter().all(|healthy| *healthy) {
         return together;
     }
     let as_logged = healthy(model, episodes);
@@ -181,11 +182,12 @@ pub fn find_faults(model: &Model, episodes: &[Episode]) -> Faults {
         };
         a.kind == b.kind && a.joints == b.joints && near
     };
-    // What all show together holds for all, unless a log by itself is healthy or has something else.
+    // What all show together holds for all, unless a log was healthy and no longer is, or has something else by itself.
     let denied = |fault: &Fault| {
-        alone.iter().zip(&as_logged).any(|(found, healthy)| {
-            (*healthy && fault.files.is_empty())
-                || (!found.faults.is_empty() && !found.faults.iter().any(|other| same(fault, other)))
+        (0..episodes.len()).any(|e| {
+            let own = &alone[e].faults;
+            (as_logged[e] && !once_mended[e] && fault.files.is_empty())
+                || (!own.is_empty() && !own.iter().any(|other| same(fault, other)))
         })
     };
     let mut faults: Vec<Fault> = together.faults.iter().filter(|fault| !denied(fault)).cloned().collect();

@@ -1,12 +1,11 @@
 //! Rows of numbers out of comma-separated text.
 
 use crate::container::Contents;
-use crate::episode::{Channel, Episode};
 use crate::error::{LogError, LogErrorKind};
-use crate::header::{Plan, plan};
+use crate::header::plan;
 use crate::joint_names;
 use crate::options::ReadOptions;
-use crate::rows::{ALLOW, Columns, Rows, line_at, shown, unreadable};
+use crate::rows::{ALLOW, Rows, line_at, shown, unreadable};
 use crate::table::Table;
 use crate::units;
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
@@ -43,7 +42,7 @@ pub(crate) fn parse(contents: &Contents, joints: &[String], options: &ReadOption
     Ok(Table {
         label: String::new(),
         rows: std::mem::take(&mut columns.lines),
-        episode: assemble(columns, &plan, joints),
+        episode: plan.episode(columns.numbers, &columns.dropped, joints),
         notes,
     })
 }
@@ -102,21 +101,4 @@ fn separator_hint(error: LogError, header: &[String], delimiter: u8) -> LogError
         .hint("Separate the columns by commas, semicolons or tabs");
     }
     error
-}
-
-fn assemble(columns: Columns, plan: &Plan, joints: &[String]) -> Episode {
-    let mut numbers = columns.numbers.into_iter();
-    let time = numbers.next().unwrap_or_default();
-    let count = time.len();
-    let mut episode = Episode { joints: joints.to_vec(), time, ..Episode::default() };
-    for &channel in &plan.channels {
-        let zero = |joint: usize| channel == Channel::Disturbance && plan.undisturbed.contains(&joint);
-        let samples = (0..joints.len())
-            .map(|joint| if zero(joint) { vec![0.0; count] } else { numbers.next().unwrap_or_default() })
-            .collect();
-        if !columns.dropped.contains(&channel) {
-            episode.set_channel(channel, samples);
-        }
-    }
-    episode
 }

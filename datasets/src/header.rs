@@ -2,7 +2,7 @@
 
 use crate::channel_names;
 use crate::column_map::ColumnMap;
-use crate::episode::Channel;
+use crate::episode::{Channel, Episode};
 use crate::error::{LogError, LogErrorKind};
 use std::collections::BTreeSet;
 
@@ -32,6 +32,26 @@ pub(crate) struct Plan {
     pub undisturbed: Vec<usize>,
     /// What was left out, about the file.
     pub notes: Vec<String>,
+}
+
+impl Plan {
+    /// The run whose feeds hold these numbers, in the order of `feeds`, without the channels that were `dropped`.
+    pub fn episode(&self, numbers: Vec<Vec<f64>>, dropped: &[Channel], joints: &[String]) -> Episode {
+        let mut numbers = numbers.into_iter();
+        let time = numbers.next().unwrap_or_default();
+        let count = time.len();
+        let mut episode = Episode { joints: joints.to_vec(), time, ..Episode::default() };
+        for &channel in &self.channels {
+            let zero = |joint: usize| channel == Channel::Disturbance && self.undisturbed.contains(&joint);
+            let samples = (0..joints.len())
+                .map(|joint| if zero(joint) { vec![0.0; count] } else { numbers.next().unwrap_or_default() })
+                .collect();
+            if !dropped.contains(&channel) {
+                episode.set_channel(channel, samples);
+            }
+        }
+        episode
+    }
 }
 
 /// Reads the header: which of `columns` feed the channels of `joints`. Errors do not carry the file's name yet.

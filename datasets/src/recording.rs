@@ -1,10 +1,10 @@
 //! Named columns of numbers, as containers other than text hold them, made a run of the robot.
 
 use crate::channel_names;
-use crate::episode::{Channel, Episode};
+use crate::episode::Channel;
 use crate::error::{LogError, LogErrorKind};
 use crate::formats::Request;
-use crate::header::{Plan, plan};
+use crate::header::plan;
 use crate::joint_names;
 use crate::table::Table;
 
@@ -60,7 +60,7 @@ impl Recording {
             numbers.push(values);
         }
         check_time(&numbers[0], &self.columns[plan.feeds[0].index].0)?;
-        let episode = assemble(numbers, &plan, &dropped, joints);
+        let episode = plan.episode(numbers, &dropped, joints);
         let rows = (1..=count).map(|row| u32::try_from(row).unwrap_or(u32::MAX)).collect();
         Ok(Table { label: self.label, episode, rows, notes: self.notes })
     }
@@ -129,21 +129,4 @@ fn check_time(time: &[f64], column: &str) -> Result<(), LogError> {
             .hint("Split the log where a new run starts, or sort its samples by time"))
         }
     }
-}
-
-fn assemble(numbers: Vec<Vec<f64>>, plan: &Plan, dropped: &[Channel], joints: &[String]) -> Episode {
-    let mut numbers = numbers.into_iter();
-    let time = numbers.next().unwrap_or_default();
-    let count = time.len();
-    let mut episode = Episode { joints: joints.to_vec(), time, ..Episode::default() };
-    for &channel in &plan.channels {
-        let zero = |joint: usize| channel == Channel::Disturbance && plan.undisturbed.contains(&joint);
-        let samples = (0..joints.len())
-            .map(|joint| if zero(joint) { vec![0.0; count] } else { numbers.next().unwrap_or_default() })
-            .collect();
-        if !dropped.contains(&channel) {
-            episode.set_channel(channel, samples);
-        }
-    }
-    episode
 }

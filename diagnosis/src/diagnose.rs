@@ -1,13 +1,13 @@
 //! The diagnosis: logs and a robot in; where, which and how far out.
 
 use crate::band::Band;
+use crate::climb::{self, LATE, Rival};
 use crate::contact;
 use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
-use crate::drive::{Through, smooth};
 use crate::estimate::{Fit, speeds};
 use crate::evidence;
 use crate::experiment;
-use crate::floor::{self, noise_floor};
+use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
 use crate::horizon::{self, Errors};
 use crate::learner;
@@ -17,7 +17,6 @@ use crate::refine::Data;
 use crate::regimes::regimes;
 use crate::schema::*;
 use crate::search::Chosen;
-use crate::select::{self, Rival};
 use crate::signals::{Signals, standstill};
 use crate::verdict::{self, Judged};
 use gapscope_datasets::{Episode, Trajectory};
@@ -28,8 +27,8 @@ use std::collections::BTreeMap;
 
 /// A rival as likely as this is named beside the choice.
 const WORTH_NAMING: f64 = 0.01;
-/// An effect whose best rival is as likely as this cannot be told from it.
-const INDISTINGUISHABLE: f64 = 0.05;
+/// An effect whose best rival is less likely by no more than this cannot be told from it, nats: twenty to one.
+const TIE: f64 = 3.0;
 /// A joint moves if this part of its samples is in motion, ...
 const MOVING_PART: f64 = 0.05;
 /// ... and its top speed is this many times the speed that counts as standing.
@@ -97,15 +96,16 @@ pub fn diagnose(
         band: band.cutoff,
         findings,
     };
-    let mut logs = Logs { model, signals, band, still, moving };
+    let noisier = noisier(model, episodes, &signals);
+    let mut logs = Logs { model, signals, noisier, band, still, moving };
     if !logs.is_excited() {
         return Ok(logs.not_excited(data));
     }
     progress("signatures of every effect", 0.05);
     logs.look_for_pushes()?;
-    let chosen = logs.load_for_gain(logs.delay_or_lag(logs.choose(progress)?)?)?;
+    let chosen = logs.choose(progress)?;
     progress("rivals", 0.55);
-    let rivals = select::rivals(&chosen.all, &chosen.choice);
+    let rivals = climb::rivals(&chosen.all, &chosen.choice);
     logs.conclude(&chosen, &rivals, data, progress)
 }
 
@@ -118,6 +118,13 @@ pub(crate) fn signals(model: &Model, episodes: &[Episode], findings: &mut Vec<St
         }
     }
     all.into_iter().flatten().collect()
+}
+
+/// The logs behind some signals with their noise once more, see [`Signals::noisier`].
+fn noisier(model: &Model, episodes: &[Episode], signals: &[Signals]) -> Vec<Signals> {
+    let of = |s: &Signals| episodes.iter().find(|episode| episode.name == s.name);
+    let noisier = |(seed, s): (usize, &Signals)| s.noisier(model, of(s)?, seed as u64);
+    signals.par_iter().enumerate().filter_map(noisier).collect()
 }
 
 /// Which joints move enough to tell anything.
@@ -144,6 +151,8 @@ fn moving(signals: &[Signals], still: &[f64], model: &Model, findings: &mut Vec<
 pub(crate) struct Logs<'a> {
     pub model: &'a Model,
     pub signals: Vec<Signals>,
+    /// The same logs with their noise once more.
+    pub noisier: Vec<Signals>,
     pub band: Band,
     pub still: Vec<f64>,
     pub moving: Vec<bool>,
@@ -164,7 +173,7 @@ impl Logs<'_> {
             .par_iter()
             .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
             .collect();
-        let noise = noise_floor(&self.signals, &self.band, &nominal, n, 0.0);
+        let noise = noise_floor(&self.signals, &self.band, &nominal, n);
         let mut candidates = Candidate::all(self.model);
         candidates.retain(|c| COMMON.contains(&c.kind));
         let terms = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
@@ -193,15 +202,14 @@ impl Logs<'_> {
             standstill: &self.still,
             moving: &self.moving,
             noise,
-            rubbing: false,
         }
     }
 
     /// Residuals and state errors on each fold of the model fitted without that fold.
     fn held_out(&self, problem: &Problem, set: &[usize]) -> Result<HeldOut, EffectError> {
-        let rows = self.held_out_rows(problem, set, None)?;
+        let rows = self.held_out_rows(problem, set)?;
         let fits = Fit::without_folds(problem, set);
-        let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
+        let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.bodies(problem, self.model)).collect();
         let side = problem.side(set);
         let mut steps = true;
         for effects in &effects {
@@ -217,10 +225,10 @@ impl Logs<'_> {
         Ok(HeldOut { rows, errors })
     }
 
-    /// The residuals alone, that of one joint through a filter where there is one.
-    fn held_out_rows(&self, problem: &Problem, set: &[usize], through: Option<Through>) -> Result<Rows, EffectError> {
+    /// The residuals alone.
+    fn held_out_rows(&self, problem: &Problem, set: &[usize]) -> Result<Rows, EffectError> {
         let fits = Fit::without_folds(problem, set);
-        let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.effects(problem, self.model)).collect();
+        let effects: Vec<Vec<Effect>> = fits.iter().map(|fit| fit.bodies(problem, self.model)).collect();
         let side = problem.side(set);
         let in_fold = |i: usize, fold: usize| self.band.rows[i].fold == fold;
         let runs: Vec<(usize, usize)> = (0..self.signals.len())
@@ -233,7 +241,7 @@ impl Logs<'_> {
                 let s = &self.signals[e];
                 let mut plant = plant_pushed(self.model, &effects[fold], side, s.dt, &s.pushed)?;
                 let rest = residual(&mut plant, self.model, s, &self.still, fits[fold].alignment());
-                Ok(rest.into_iter().enumerate().map(|(j, x)| self.filter_through(e, j, x, through)).collect())
+                Ok(rest.iter().map(|x| self.band.filter(e, x)).collect())
             })
             .collect::<Result<_, EffectError>>()?;
         let mut rows: Rows = vec![vec![0.0; self.band.rows.len()]; self.model.dof()];
@@ -247,35 +255,8 @@ impl Logs<'_> {
         Ok(rows)
     }
 
-    fn filter_through(&self, episode: usize, joint: usize, torque: Vec<f64>, through: Option<Through>) -> Vec<f64> {
-        let cutoff = through.filter(|through| through.joint == joint).map(|through| through.cutoff);
-        self.band.filter(episode, &smooth(torque, cutoff, self.signals[episode].dt))
-    }
-
-    /// Held-out gap of a set, as a part of the effort's variation, beside what laws outside the catalogue in it account for.
-    pub(crate) fn left(&self, problem: &Problem, set: &[usize]) -> Result<f64, EffectError> {
-        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
-        Ok(gap::weighted_rms(&self.left_by_joint(problem, set)?, &weights))
-    }
-
-    /// The same as sums of squares a joint, (N m)² or N², and the count of rows.
-    pub(crate) fn left_by_joint(&self, problem: &Problem, set: &[usize]) -> Result<Vec<f64>, EffectError> {
-        Ok(gap::total(&self.left_by_block(problem, set, None)?))
-    }
-
-    /// The same block by block, one joint through a filter where there is one.
-    pub(crate) fn left_by_block(
-        &self,
-        problem: &Problem,
-        set: &[usize],
-        through: Option<Through>,
-    ) -> Result<Vec<Vec<f64>>, EffectError> {
-        let rows = self.beside_outside(problem, set, &self.held_out_rows(problem, set, through)?, through);
-        Ok(gap::squares(&self.band, &rows, |_| true))
-    }
-
     /// Held-out residuals of a set less what laws outside the catalogue in it account for.
-    fn beside_outside(&self, problem: &Problem, set: &[usize], rows: &Rows, through: Option<Through>) -> Rows {
+    fn beside_outside(&self, problem: &Problem, set: &[usize], rows: &Rows) -> Rows {
         let mut rows = rows.clone();
         let outside = problem.outside(set);
         if outside.is_empty() {
@@ -288,7 +269,7 @@ impl Logs<'_> {
                 let columns = problem.entries[c].candidate.columns(&s.motion(self.model, &self.still));
                 for (i, column) in columns.iter().enumerate() {
                     for (j, torque) in &column.rows {
-                        let torque = self.filter_through(e, *j, torque.clone(), through);
+                        let torque = self.band.filter(e, torque);
                         for (row, x) in self.band.of_episode[e].clone().zip(torque) {
                             rows[*j][row] -= theta[self.band.rows[row].fold][i] * x;
                         }
@@ -345,13 +326,13 @@ impl Logs<'_> {
         let model = self.model;
         let weights = gap::weights(&self.signals, &self.moving);
         let (problem, fit) = (&chosen.exact, &chosen.fit);
-        let effects = fit.effects(problem, model);
+        let effects = fit.bodies(problem, model);
         let side = problem.side(&fit.set);
         progress("held-out rollouts", 0.7);
         let before = self.nominal();
         let after = self.held_out(problem, &fit.set)?;
         let final_residuals = self.data(&chosen.noise).rest(problem, fit)?;
-        let floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof(), floor::lag(&effects));
+        let floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof());
         progress("intervals", 0.85);
         let everything = |_: usize| true;
         let squares = |rows: &Rows| gap::squares(&self.band, rows, everything);
@@ -387,7 +368,7 @@ impl Logs<'_> {
         };
         let turning = problem.turning(&fit.set);
         let judged = |after: &Rows| Judged::new(&sums(&before.rows), &sums(after), &floor, &concern, &turning);
-        let beside = judged(&self.beside_outside(problem, &fit.set, &after.rows, None));
+        let beside = judged(&self.beside_outside(problem, &fit.set, &after.rows));
         let judged = judged(&after.rows);
         let unexplained = judged.unexplained_fraction();
         let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());
@@ -432,6 +413,7 @@ impl Logs<'_> {
             power: power::power(model, &chosen.all, &chosen.choice.set, &drives),
             effects: found,
             alternatives: alternatives(&chosen.all, rivals),
+            why: self.why(chosen, rivals),
             unexplained: Unexplained {
                 fraction: unexplained,
                 learnable,
@@ -461,35 +443,43 @@ impl Logs<'_> {
         change: impl Fn(&Rows) -> Change,
     ) -> Result<Vec<FoundEffect>, EffectError> {
         let (problem, fit) = (&chosen.exact, &chosen.fit);
-        let kinds = select::kinds(problem, &fit.set);
+        let kinds = climb::kinds(problem, &fit.set);
         let speeds = speeds(&self.signals, &self.band, self.model.dof());
         let mut found = Vec::new();
         for (effect, own) in fit.effects_with_candidates(problem, self.model) {
             let kind = effect.kind();
-            let alone = change(&self.held_out_rows(problem, &own, None)?);
+            let alone = change(&self.held_out_rows(problem, &own)?);
             let turned = chosen.turned.as_ref().filter(|t| t.drive.kind == kind);
             // The choice sees a drive by its rotor.
             let seen_as = if turned.is_some() { Kind::Armature } else { kind };
             let rival = rivals.iter().find(|r| r.without == seen_as);
-            let late = chosen.late_doubt.filter(|_| select::LATE.contains(&kind));
-            let doubt = late.or(turned.map(|t| t.doubt)).unwrap_or_else(|| rival.map_or(0.0, |r| r.probability));
+            let late = chosen.late_doubt.filter(|_| LATE.contains(&kind));
+            let exact = chosen.needed.iter().find(|(needed, _)| *needed == kind).map(|(_, odds)| *odds);
+            let odds = match turned {
+                Some(turned) => turned.odds,
+                None => exact.or(rival.map(|r| r.odds)).unwrap_or(f64::INFINITY),
+            };
+            // What could be another is no surer than that it is not.
+            let tied = rival.map(|r| r.odds).filter(|odds| turned.is_none() && *odds < TIE);
+            let odds = tied.map_or(odds, |tied| odds.min(tied.max(0.0)));
+            let doubt = late.unwrap_or(0.0).max(1.0 / (1.0 + odds.exp()));
             let mut confused = rival
                 .filter(|_| turned.is_none() && late.is_none())
-                .filter(|r| r.probability > INDISTINGUISHABLE)
+                .filter(|r| r.odds.min(r.by_logs) < TIE)
                 .map_or_else(Vec::new, |r| {
-                    select::kinds(&chosen.all, &r.choice.set)
+                    climb::kinds(&chosen.all, &r.choice.set)
                         .into_iter()
                         .filter(|k| !kinds.contains(k) && !k.is_outside())
                         .map(|k| k.name().to_owned())
                         .collect()
                 });
-            if late.is_some_and(|doubt| doubt > INDISTINGUISHABLE) {
-                confused.extend(select::LATE.iter().filter(|other| **other != kind).map(|k| k.name().to_owned()));
+            if late.is_some_and(|doubt| doubt > (-TIE).exp()) {
+                confused.extend(LATE.iter().filter(|other| **other != kind).map(|k| k.name().to_owned()));
             }
             // What other joints leave says nothing against it.
             let joints: Vec<usize> = own.iter().flat_map(|&c| problem.entries[c].candidate.joints.clone()).collect();
             let misfit = misfit.map_or(0.0, |judged| judged.unexplained_of(&joints));
-            let loss = rival.map_or(0.0, |r| r.choice.blocks.iter().sum::<f64>());
+            let loss = turned.map_or_else(|| rival.map_or(0.0, |r| r.odds), |turned| turned.odds);
             found.push((
                 loss,
                 FoundEffect {
@@ -506,6 +496,53 @@ impl Logs<'_> {
         // Strongest first: by what the best explanation without it leaves.
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         Ok(found.into_iter().map(|(_, effect)| effect).collect())
+    }
+
+    /// The comparisons that decided: each kind found against the best account without it, each spring or play that was tried
+    /// against a rigid drive, and each kind that was not found against what was.
+    fn why(&self, chosen: &Chosen, rivals: &[Rival]) -> Vec<Why> {
+        let names = |joints: &[usize]| joints.iter().map(|&j| self.model.joints()[j].name.clone()).collect();
+        let set = |kinds: Vec<Kind>| -> String {
+            let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
+            if names.is_empty() { "nothing".into() } else { names.join(" + ") }
+        };
+        let mut why: Vec<Why> = rivals
+            .iter()
+            .map(|rival| Why {
+                proposed: rival.without.name().to_owned(),
+                joints: Vec::new(),
+                against: set(climb::kinds(&chosen.all, &rival.choice.set)),
+                odds: rival.odds,
+                taken: true,
+            })
+            .collect();
+        let turned = chosen.turned.as_ref();
+        why.extend(chosen.tried.iter().map(|(drive, odds)| Why {
+            proposed: drive.kind.name().to_owned(),
+            joints: names(&drive.joints),
+            against: "a rigid drive".into(),
+            odds: *odds,
+            taken: turned.is_some_and(|turned| turned.drive == *drive),
+        }));
+        for kind in Kind::ALL.into_iter().filter(|kind| Candidate::new(*kind, Vec::new()).turns()) {
+            if !chosen.tried.iter().any(|(drive, _)| drive.kind == kind) {
+                let nothing = "a rigid drive, which leaves no more than any drive that turns on its own".into();
+                let proposed = kind.name().to_owned();
+                why.push(Why { proposed, joints: Vec::new(), against: nothing, odds: 0.0, taken: false });
+            }
+        }
+        let found = set(climb::kinds(&chosen.all, &chosen.choice.set));
+        why.extend(climb::denied(&chosen.all, &chosen.choice).into_iter().map(|(c, odds)| {
+            let candidate = &chosen.all.entries[c].candidate;
+            Why {
+                proposed: candidate.kind.name().to_owned(),
+                joints: names(&candidate.joints),
+                against: found.clone(),
+                odds,
+                taken: false,
+            }
+        }));
+        why
     }
 
     /// The answer where the logs are too still or too short.
@@ -528,6 +565,7 @@ impl Logs<'_> {
             },
             effects: Vec::new(),
             alternatives: Vec::new(),
+            why: Vec::new(),
             unexplained: Unexplained { fraction: 0.0, learnable: 0.0, resembles: None, regimes: Vec::new() },
             shrink: Shrink {
                 torque: nothing(),
@@ -555,14 +593,14 @@ impl Logs<'_> {
 fn alternatives(problem: &Problem, rivals: &[Rival]) -> Vec<Alternative> {
     let mut all: Vec<Alternative> = rivals
         .iter()
-        .filter(|r| r.probability > WORTH_NAMING)
+        .filter(|r| r.probability() > WORTH_NAMING)
         .map(|r| Alternative {
-            effects: select::kinds(problem, &r.choice.set)
+            effects: climb::kinds(problem, &r.choice.set)
                 .iter()
                 .filter(|kind| !kind.is_outside())
                 .map(|kind| kind.name().to_owned())
                 .collect(),
-            probability: r.probability,
+            probability: r.probability(),
         })
         .collect();
     all.sort_by(|a, b| b.probability.total_cmp(&a.probability).then_with(|| a.effects.cmp(&b.effects)));

@@ -5,12 +5,11 @@
 //! leaves least. An account that swings with the noise of the position also explains some of it; what noise alone would
 //! leave is found by a second run with more of it, and taken off (a simulation of the error in the variables, Cook and
 //! Stefanski, J. Am. Stat. Assoc. 89(428) 1994). Springs whose account multiplies the noise of the link's acceleration are
-//! looked for through a filter as well, see [`Through`].
+//! looked for through a filter as well.
 
 mod choice;
 mod least;
 
-pub(crate) use choice::STANDS_IN;
 pub(crate) use least::Least;
 
 use crate::band::Row;
@@ -54,8 +53,10 @@ const PART: f64 = 0.85;
 /// Part of the noise, and of the effort, below which what is left of a block of time is as good as nothing: play may show in
 /// few of them.
 const OF_NOISE: f64 = 0.25;
-pub(crate) const NOTHING: f64 = 1e-3;
-/// What is looked for through a filter, see [`Through`].
+const NOTHING: f64 = 1e-3;
+/// What is looked for through a filter. A spring behind an encoder on the link is told by the torque that the rotor takes as
+/// the spring winds up, which grows with the fourth power of the frequency, and so does noise: above the resonance of rotor
+/// and link on the spring it drowns what both accounts leave.
 const FILTERED: (Kind, EncoderSide) = (Kind::JointElasticity, EncoderSide::Link);
 /// Resonances, Hz, between which a spring is one that somebody would build and that these logs could show.
 const SOFTEST: f64 = 1.5;
@@ -73,8 +74,6 @@ pub(crate) struct Account {
     pub drive: Candidate,
     /// By how many standard errors it is better.
     pub beyond: f64,
-    /// The filter through which it is.
-    pub through: Option<Through>,
 }
 
 /// One joint in all logs, and the same with more noise.
@@ -102,19 +101,6 @@ struct View {
     episode: Option<usize>,
     /// Through a low-pass filter of this cut-off, rad/s.
     smooth: Option<f64>,
-}
-
-/// A filter through which an account of a drive is held against a rigid one.
-///
-/// A spring behind an encoder on the link is told by the torque that the rotor takes as the spring winds up, which grows
-/// with the fourth power of the frequency, and so does noise: above the resonance of rotor and link on the spring it
-/// drowns what both accounts leave.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Through {
-    /// The joint whose torque goes through it.
-    pub joint: usize,
-    /// Its cut-off, rad/s.
-    pub cutoff: f64,
 }
 
 /// What a rigid drive leaves in a view, block by block, (N m)²: accounts are held against it.
@@ -190,7 +176,7 @@ impl<'a> Study<'a> {
         let rest: Vec<Vec<f64>> = study.runs.iter().map(|run| run.left_by(&rigid, study.rotor)).collect();
         // What is white of the effort, and not taken up by the motion, is noise of its measurement.
         let alone: Vec<Vec<Vec<f64>>> = rest.iter().map(|rest| vec![rest.clone()]).collect();
-        let floor = noise_floor(&logs.signals, &logs.band, &alone, 1, 0.0)[0];
+        let floor = noise_floor(&logs.signals, &logs.band, &alone, 1)[0];
         let white = |s: &Signals| {
             let left = floor / (2.0 * logs.band.cutoff * s.raw.dt).sqrt();
             left.min(s.effort_noise[joint])
@@ -265,8 +251,7 @@ impl<'a> Study<'a> {
         let possible =
             self.shows(rotor) && (drive.kind != Kind::JointElasticity || (SOFTEST..STIFFEST).contains(&drive.shape));
         let knob_error = self.error(&drive, rotor);
-        let through = self.view(&drive, rotor).smooth.map(|cutoff| Through { joint: self.joint, cutoff });
-        possible.then_some(Account { drive: Candidate { knob_error, ..drive }, beyond, through })
+        possible.then_some(Account { drive: Candidate { knob_error, ..drive }, beyond })
     }
 
     /// Whether a rotor is heavy enough for its drive to show. A link without inertia about its joint has no drive that turns

@@ -1,12 +1,12 @@
 //! From coefficients to effects with parameters and intervals.
 
 use crate::band::Band;
+use crate::climb::LATE;
 use crate::problem::Problem;
 use crate::schema::{Estimate, Parameter, Quantity};
-use crate::select::LATE;
 use crate::signals::Signals;
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::{Candidate, Effect, Kind, Value};
+use gapscope_effects::{Candidate, Effect, Kind, Plant, Value, keep_bodies};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -36,6 +36,11 @@ pub fn speeds(signals: &[Signals], band: &Band, joints: usize) -> Vec<Vec<usize>
             part
         })
         .collect()
+}
+
+/// Half of a 95 % interval in standard errors, where so many groups of rows tell the error.
+fn quantile(groups: usize) -> f64 {
+    StudentsT::new(0.0, 1.0, groups.saturating_sub(1).max(1) as f64).map_or(1.96, |t| t.inverse_cdf(0.975))
 }
 
 /// A model in coefficients: a set of candidates fitted to some rows.
@@ -87,9 +92,22 @@ impl Fit {
             .unzip()
     }
 
-    /// The effects, one a kind where the kind has a value per joint. Candidates whose coefficients no physical effect has are left out.
+    /// The effects, one a kind where the kind has a value per joint. Candidates whose coefficients no physical effect has are
+    /// left out. Links may be what no body is: where a search moves on from here, a body that was moved would lead it astray.
     pub fn effects(&self, problem: &Problem, model: &Model) -> Vec<Effect> {
-        self.effects_with_candidates(problem, model).into_iter().map(|(effect, _)| effect).collect()
+        let mut effects: Vec<Effect> =
+            self.effects_with_candidates(problem, model).into_iter().map(|(effect, _)| effect).collect();
+        if Plant::new(model, &effects, 1e-3).is_err() {
+            keep_bodies(model, &mut effects);
+        }
+        effects
+    }
+
+    /// The same with every link a body.
+    pub fn bodies(&self, problem: &Problem, model: &Model) -> Vec<Effect> {
+        let mut effects = self.effects(problem, model);
+        keep_bodies(model, &mut effects);
+        effects
     }
 
     /// The effects, each with the candidates that it is made of.
@@ -108,6 +126,12 @@ impl Fit {
         effects
     }
 
+    /// Half-widths of the 95 % intervals of the coefficients, by what blocks of time tell.
+    pub fn half_widths(&self, problem: &Problem) -> Vec<f64> {
+        let quantile = quantile(problem.blocks_used());
+        problem.covariance(&self.columns, &self.theta).diagonal().iter().map(|v| quantile * v.sqrt()).collect()
+    }
+
     /// Parameters of an effect of a kind made of some candidates under their public names, with 95 % intervals by the delta
     /// method: the wider of what blocks of time and of what parts of the speed of each of its joints tell, `speeds` telling the
     /// part of each row of the band for each joint.
@@ -119,9 +143,6 @@ impl Fit {
         candidates: &[usize],
         speeds: &[Vec<usize>],
     ) -> BTreeMap<String, Parameter> {
-        let quantile = |groups: usize| {
-            StudentsT::new(0.0, 1.0, groups.saturating_sub(1).max(1) as f64).map_or(1.96, |t| t.inverse_cdf(0.975))
-        };
         let over_time = problem.covariance(&self.columns, &self.theta) * quantile(problem.blocks_used()).powi(2);
         let mut over_speed: BTreeMap<usize, DMatrix<f64>> = BTreeMap::new();
         let mut parameters: BTreeMap<String, Parameter> = BTreeMap::new();
@@ -226,7 +247,7 @@ fn insert(parameters: &mut BTreeMap<String, Parameter>, model: &Model, value: &V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constancy::tests::{fitted, torque};
+    use crate::support::{fitted, torque};
 
     /// A drag that grows with the square of the speed, fitted as one that grows with it, is too weak at any high speed and too
     /// strong at any low one: in every block of time the two are nearly even, and only parts of the speed tell.

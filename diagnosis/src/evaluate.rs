@@ -3,7 +3,7 @@
 use crate::band::Band;
 use crate::corrected::{Corrected, per_joint, residual};
 use crate::diagnose::signals;
-use crate::floor::{self, noise_floor};
+use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
 use crate::horizon;
 use crate::regimes::regimes;
@@ -48,7 +48,7 @@ pub fn evaluate(
         Some(c) => signals.iter().map(|s| c.residual(model, s)).collect::<Result<_, EffectError>>()?,
         None => nominal.clone(),
     };
-    let floor = noise_floor(&signals, &band, &after, n, corrected.map_or(0.0, |c| floor::lag(&c.effects)));
+    let floor = noise_floor(&signals, &band, &after, n);
     let floor_rms = gap::weighted_floor(&floor, &weights);
     let (before_rows, after_rows) = (gap::at_rows(&band, &nominal, n), gap::at_rows(&band, &after, n));
     let before_errors = horizon::errors_of(&signals, &band, model, |dt| Plant::nominal(model, dt));

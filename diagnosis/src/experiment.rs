@@ -5,12 +5,12 @@
 //! Biometrika 62(1) 1975).
 
 use crate::band::Band;
+use crate::climb::{Choice, Rival, kinds};
 use crate::corrected::plant;
 use crate::estimate::Fit;
 use crate::problem::{Problem, Term};
 use crate::refine::Data;
 use crate::schema::{FoundEffect, NextExperiment};
-use crate::select::{Choice, Rival, kinds};
 use crate::signals::{Signals, standstill};
 use gapscope_datasets::{Episode, Reference, ReferenceKind, Trajectory};
 use gapscope_dynamics::{Data as Scratch, Model};
@@ -249,7 +249,7 @@ impl<'a> Pair<'a> {
         let term = |&c: &usize| Term { candidate: self.problem.entries[c].candidate.clone(), tangent_at: None };
         let terms = self.union.iter().map(term).collect();
         let moving = vec![true; data.model.dof()];
-        let mut motion = Problem::new(data.model, &signals, &band, &still, &moving, terms, data.noise);
+        let mut motion = Problem::new(data.model, &signals, &band, &still, &moving, terms);
         motion.weigh_like(self.problem, &band);
         let there = self.deviance(&motion, &self.rival);
         Ok(if there > 1.0 { there } else { self.deviance(&motion, &self.chosen) }.sqrt())
@@ -313,6 +313,7 @@ fn predicted(
         tau: &nominal,
         nominal: &nominal,
         load: &nominal,
+        taken: &nominal,
         effort_noise: &[],
         held: None,
         dt,

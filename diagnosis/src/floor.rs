@@ -7,7 +7,6 @@
 use crate::band::Band;
 use crate::kernel::Kernel;
 use crate::signals::{Signals, derivative_kernel};
-use gapscope_effects::Effect;
 use rustfft::{FftPlanner, num_complex::Complex};
 use std::f64::consts::PI;
 
@@ -17,11 +16,7 @@ const SEGMENT: f64 = 1.0;
 const ABOVE: (f64, f64) = (1.5, 4.0);
 
 /// Root mean square of the noise in the band for each joint, N m or N, from residuals of every episode (`[joint][signal]`).
-///
-/// `lag` is the time constant, s, of the first-order response that the effort of those residuals has gone through: its
-/// noise is no longer white, but falls off with it.
-pub fn noise_floor(signals: &[Signals], band: &Band, residuals: &[Vec<Vec<f64>>], joints: usize, lag: f64) -> Vec<f64> {
-    let passed = |f: f64| 1.0 / (1.0 + (2.0 * PI * f * lag).powi(2));
+pub fn noise_floor(signals: &[Signals], band: &Band, residuals: &[Vec<Vec<f64>>], joints: usize) -> Vec<f64> {
     let mut planner = FftPlanner::new();
     (0..joints)
         .map(|j| {
@@ -62,13 +57,13 @@ pub fn noise_floor(signals: &[Signals], band: &Band, residuals: &[Vec<Vec<f64>>]
                     .collect();
                 let (white, steep) = two_slopes(&bins, |b| {
                     let f = frequency(b) / band.cutoff;
-                    (density[b] / smooth.power(frequency(b)), passed(frequency(b)), f.powi(4))
+                    (density[b] / smooth.power(frequency(b)), 1.0, f.powi(4))
                 });
                 // Mean square in the band: the average of the density over all frequencies up to half the rate.
                 let in_band: f64 = (0..length / 2)
                     .map(|b| {
                         let f = frequency(b);
-                        (white * passed(f) + steep * (f / band.cutoff).powi(4)) * smooth.power(f) * pass.power(f)
+                        (white + steep * (f / band.cutoff).powi(4)) * smooth.power(f) * pass.power(f)
                     })
                     .sum::<f64>()
                     / (length as f64 / 2.0);
@@ -108,12 +103,6 @@ fn two_slopes(bins: &[usize], point: impl Fn(usize) -> (f64, f64, f64)) -> (f64,
     } else {
         (a, b)
     }
-}
-
-/// Time constant of the first-order response that effects give an effort, s.
-pub fn lag(effects: &[Effect]) -> f64 {
-    let each = effects.iter().map(|effect| if let Effect::ActuatorLag(lag) = effect { lag.time_constant } else { 0.0 });
-    each.sum()
 }
 
 /// Frequency response of a kernel.

@@ -39,15 +39,16 @@ pub fn weights(signals: &[Signals], moving: &[bool]) -> Vec<f64> {
         .collect()
 }
 
-/// The same weights but for joints whose effort hardly leaves zero: there a thousandth of the effort limit is the scale, so
-/// that a verdict does not hang on what no drive would notice.
+/// Weight of each joint where it is asked whether what is left of it concerns anyone: one over the root mean square of its
+/// effort, which the errors of a drive's torque go with, and no less than a thousandth of its limit.
 pub fn weights_of_concern(model: &Model, signals: &[Signals], moving: &[bool]) -> Vec<f64> {
     let limits = model.joints().iter().map(|j| j.limits.effort.unwrap_or(0.0));
-    weights(signals, moving)
-        .into_iter()
-        .zip(limits)
-        .map(|(w, limit)| if w > 0.0 { 1.0 / (1.0 / w).hypot(UNNOTICED * limit) } else { 0.0 })
-        .collect()
+    let size = |j: usize| {
+        let all = || signals.iter().flat_map(|s| s.tau[j].iter());
+        (all().map(|t| t * t).sum::<f64>() / all().count().max(1) as f64).sqrt()
+    };
+    let of = |(j, limit): (usize, f64)| if moving[j] { 1.0 / size(j).hypot(UNNOTICED * limit) } else { 0.0 };
+    limits.enumerate().map(of).map(|w| if w.is_finite() { w } else { 0.0 }).collect()
 }
 
 /// Sums of squares per block and joint: `[block][joint]`, and the count of rows behind them as last entry. Blocks without a row are left out.
@@ -74,12 +75,6 @@ pub fn calm(blocks: &[Vec<f64>], weights: &[f64], jolting: &[bool]) -> Vec<bool>
     sorted.sort_by(f64::total_cmp);
     let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
     jolts.iter().map(|jolt| *jolt <= middle).collect()
-}
-
-/// Weighted root mean square as the geometric mean over blocks, each at least `nothing`.
-pub fn mean_level(blocks: &[Vec<f64>], weights: &[f64], nothing: f64) -> f64 {
-    let sum: f64 = blocks.iter().map(|block| weighted_rms(block, weights).hypot(nothing).ln()).sum();
-    (sum / blocks.len().max(1) as f64).exp()
 }
 
 /// Adds up blocks.
@@ -177,17 +172,5 @@ mod tests {
         assert!((left(&blocks(0)) - 1.0).abs() < 1e-12);
         assert!(left(&blocks(1)) > 50.0);
         assert_eq!(calm(&blocks(0), &[1.0; 2], &[false; 2]), [true; 5], "without play there are no jolts");
-    }
-
-    #[test]
-    fn blocks_in_which_next_to_nothing_is_left_do_not_outweigh_the_one_that_tells() {
-        // Off by 1e-6 and then 4e-6 in four blocks, by 1 and then 0.01 in the fifth.
-        let blocks = |small: f64, large: f64| -> Vec<Vec<f64>> {
-            [small, small, large, small, small].map(|x: f64| vec![x * x, 1.0]).to_vec()
-        };
-        let (before, after) = (blocks(1e-6, 1.0), blocks(4e-6, 0.01));
-        let level = |blocks: &[Vec<f64>], nothing| mean_level(blocks, &[1.0], nothing);
-        assert!(level(&after, 1e-3) < 0.5 * level(&before, 1e-3));
-        assert!(level(&after, 0.0) > level(&before, 0.0), "what nothing is for");
     }
 }

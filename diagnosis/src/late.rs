@@ -4,10 +4,10 @@
 //! by the model (instrumental variables; Söderström and Stoica, Instrumental Variable Methods for System Identification,
 //! 1983).
 
+use crate::climb::{Choice, LATE};
 use crate::diagnose::Logs;
 use crate::gap::{self, Rows};
 use crate::search::{Chosen, with_drive};
-use crate::select::{self, LATE};
 use gapscope_effects::{Candidate, EffectError, Kind};
 
 /// Standard error below which the part that speaks for the other law is not believed: no drive is one or the other exactly.
@@ -37,12 +37,17 @@ impl Logs<'_> {
         let at_rows = |rest: Vec<Vec<Vec<f64>>>| gap::at_rows(&self.band, &rest, self.model.dof());
         let rests = [at_rows(data.rest(&chosen.exact, &chosen.fit)?), at_rows(data.rest(&exact, &fit)?)];
         let doubt = self.speaks_for_the_second([law, &exact.entries[at].candidate], &rests);
+        // What was decided here no climb turns round.
+        let mut chosen = chosen;
+        let lost = if doubt <= 0.5 { other } else { chosen.choice.set[at] };
+        let closed = vec![chosen.all.entries[lost].candidate.kind];
+        chosen.all.closed = closed;
         if doubt <= 0.5 {
             return Ok(Chosen { late_doubt: Some(doubt), ..chosen });
         }
         set.sort_unstable();
         let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
-        let choice = select::evaluate(&chosen.all, set);
+        let choice = Choice { set };
         Ok(Chosen { choice, exact, fit, late_doubt: Some(1.0 - doubt), ..chosen })
     }
 

@@ -9,7 +9,7 @@
 mod band;
 mod bootstrap;
 mod break_away;
-mod constancy;
+mod climb;
 mod contact;
 mod corrected;
 mod diagnose;
@@ -25,7 +25,6 @@ mod kernel;
 mod late;
 mod learner;
 mod limits;
-mod load;
 mod power;
 mod problem;
 mod refine;
@@ -34,8 +33,9 @@ mod rollout;
 pub mod schema;
 mod screen;
 mod search;
-mod select;
 mod signals;
+#[cfg(test)]
+mod support;
 mod verdict;
 
 pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};

@@ -1,14 +1,10 @@
 //! Limits of a drive's torque: they are cut from the measured effort, and so can explain its noise or what they cut away.
 
 use crate::diagnose::Logs;
-use crate::search::Chosen;
-use gapscope_effects::{Kind, Range};
+use gapscope_effects::Range;
 
 /// A torque this many times its noise is no artefact of it.
 const CLEAR: f64 = 8.0;
-/// A limit is known to the digit once it is reached: more than this part of what it cuts it does not leave there.
-const OF_CUT: f64 = 0.25;
-
 impl Logs<'_> {
     /// Where the limit of each joint's drive may lie, N m or N. One that cuts most of an effort explains what it has cut away,
     /// and a cut of no more than an effort's noise explains that noise by itself.
@@ -22,16 +18,6 @@ impl Logs<'_> {
         };
         (0..self.model.dof()).map(of).collect()
     }
-}
-
-/// Whether the limits of a set leave little of what they cut.
-pub(crate) fn hold(chosen: &Chosen) -> bool {
-    let (exact, fit) = (&chosen.exact, &chosen.fit);
-    let limit = |c: &&usize| exact.entries[**c].candidate.kind == Kind::TorqueSaturation;
-    fit.set.iter().filter(limit).all(|&c| {
-        let (cut, left) = exact.where_it_acts(c, &fit.columns, &fit.theta);
-        left < OF_CUT * cut
-    })
 }
 
 fn median(mut x: Vec<f64>) -> f64 {

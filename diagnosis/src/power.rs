@@ -5,16 +5,19 @@
 //! pays its cost of complexity, lies beyond the standard errors that pruning asks for, and moves some joint by as much
 //! torque as anything must that is to be named.
 
+use crate::climb::{Competition, excludes};
 use crate::drive::Least;
 use crate::problem::Problem;
 use crate::schema::Power;
-use crate::select;
 use gapscope_dynamics::{JointKind, Model};
 use gapscope_effects::{Candidate, Effect, Kind};
 use nalgebra::{DMatrix, DVector};
 
 /// Part of a column's size below which what the set leaves of it is rounding.
 const ROUNDING: f64 = 1e-7;
+
+/// Nats by which an effect must be likelier than none for it to be called seen.
+const LEAST_ODDS: f64 = 3.0;
 
 /// One size of an effect, and what of it is measured.
 struct Gauge {
@@ -141,8 +144,7 @@ fn gauges(model: &Model, candidate: &Candidate) -> Vec<Gauge> {
 /// The least multiple of a direction of a candidate's coefficients at which the selection names it beside a set; `None`
 /// where the logs do not show it.
 fn least(problem: &Problem, set: &[usize], c: usize, direction: &[f64], beside_others: bool) -> Option<f64> {
-    let others: Vec<usize> =
-        set.iter().copied().filter(|&other| other != c && !select::excludes(problem, other, c)).collect();
+    let others: Vec<usize> = set.iter().copied().filter(|&other| other != c && !excludes(problem, other, c)).collect();
     let with: Vec<usize> = others.iter().copied().chain([c]).collect();
     let own: Vec<usize> = problem.entries[c].columns.clone().collect();
     let base: Vec<usize> = problem.columns(&with).into_iter().filter(|column| !own.contains(column)).collect();
@@ -161,13 +163,10 @@ fn least(problem: &Problem, set: &[usize], c: usize, direction: &[f64], beside_o
     if gain.is_nan() || gain <= ROUNDING * direction.dot(&(&gram * &direction)) {
         return None;
     }
-    // What noise alone would gain by so many coefficients is lost again on held-out data.
-    let price = select::cost(problem, &with) - select::cost(problem, &others) + own.len() as f64;
-    let doubt = (2.0 * select::STANDARD_ERRORS).powi(2);
-    let paid = (price.max(doubt) / gain).sqrt();
-    let moved = problem.contribution(&own, direction.as_slice());
-    let ratios = moved.iter().enumerate().map(|(j, moved)| select::least_moved(problem, &with, c, j) / moved);
-    Some(paid.max(ratios.fold(f64::INFINITY, f64::min)))
+    let competition = Competition::new(problem);
+    let price = competition.prior(&others) - competition.prior(&with) + problem.occam(&own, &information);
+    // Half of the deviance is a nat.
+    Some((2.0 * price.max(LEAST_ODDS) / gain).sqrt())
 }
 
 /// The part of some columns' inner products that others explain.

@@ -7,7 +7,7 @@ use crate::estimate::Fit;
 use crate::problem::{Problem, Term};
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
-use gapscope_effects::{Candidate, EffectError, Kind, Motion, Plant};
+use gapscope_effects::{Candidate, Effect, EffectError, Kind, Motion, Plant};
 use rayon::prelude::*;
 
 /// Rounds, at most.
@@ -46,16 +46,12 @@ pub struct Data<'a> {
     pub moving: &'a [bool],
     /// Noise floor of each joint.
     pub noise: &'a [f64],
-    /// Whether friction loads the gears as well: exact, but while it is not known which friction of a joint there is, friction
-    /// under load could then be any of it.
-    pub rubbing: bool,
 }
 
 impl Data<'_> {
     /// A problem of some terms, weighed by what all those of some kinds leave.
     pub fn problem(&self, terms: Vec<Term>, weighed_by: &[Kind]) -> Problem {
-        let mut problem =
-            Problem::new(self.model, self.signals, self.band, self.standstill, self.moving, terms, self.noise);
+        let mut problem = Problem::new(self.model, self.signals, self.band, self.standstill, self.moving, terms);
         let weighs = |c: &usize| weighed_by.contains(&problem.entries[*c].candidate.kind);
         let set: Vec<usize> = (0..problem.entries.len()).filter(weighs).collect();
         problem.weigh(self.band, &set);
@@ -109,33 +105,35 @@ impl Data<'_> {
             .collect()
     }
 
-    /// The signals, their gears loaded by the torque that the plant takes with what a fit has beside friction, unless the data
-    /// are `rubbing`: where friction rules, the load would have the sign of the speed, and friction under load be any friction. So
-    /// would that friction itself be load beside other friction of its joint. The law counts it all. The torque is predicted without the measured effort,
-    /// whose noise would explain itself; only play is crossed as that effort drives its rotor.
+    /// The signals, their gears loaded by the torque that the plant takes with all that a fit has. The torque is predicted
+    /// without the measured effort, whose noise would explain itself; only play is crossed as that effort drives its rotor.
     ///
     /// # Errors
     /// An effect that the robot cannot have.
     pub fn loaded(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Signals>, EffectError> {
         let candidate = |c: usize| &problem.entries[c].candidate;
-        let (rubs, others): (Vec<usize>, Vec<usize>) =
-            fit.set.iter().copied().partition(|&c| Kind::FRICTION.contains(&candidate(c).kind));
-        let beside =
-            |c: usize| rubs.iter().any(|&rub| candidate(rub).joints.iter().any(|j| candidate(c).joints.contains(j)));
-        let counts = |&c: &usize| candidate(c).kind != Kind::LoadDependentFriction || !beside(c);
-        let set = if self.rubbing { fit.set.clone() } else { others.into_iter().filter(counts).collect() };
-        let effects = Fit { set, ..fit.clone() }.effects(problem, self.model);
+        let effects = fit.effects(problem, self.model);
         let side = problem.side(&fit.set);
         let crossed = effects.iter().any(|effect| effect.kind() == Kind::Backlash);
+        let early =
+            |c: &usize| !matches!(candidate(*c).kind, Kind::ActuationDelay | Kind::ActuatorLag | Kind::TorqueGainError);
+        let taken = Fit { set: fit.set.iter().copied().filter(early).collect(), ..fit.clone() };
+        let taken = taken.effects(problem, self.model);
         self.signals
             .par_iter()
             .map(|s| {
-                let mut plant = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
-                let idle = || s.tau.iter().map(|tau| vec![0.0; tau.len()]).collect();
-                let tau: Vec<Vec<f64>> = if crossed { s.tau.clone() } else { idle() };
-                let rest = plant.residuals(&Motion { tau: &tau, held: None, ..s.motion(self.model, self.standstill) });
-                let less = |(tau, rest): (&Vec<f64>, &Vec<f64>)| tau.iter().zip(rest).map(|(t, r)| t - r).collect();
-                Ok(Signals { load: Some(tau.iter().zip(&rest).map(less).collect()), ..s.clone() })
+                let idle: Vec<Vec<f64>> = s.tau.iter().map(|tau| vec![0.0; tau.len()]).collect();
+                let torque = |effects: &[Effect], tau: &[Vec<f64>]| -> Result<Vec<Vec<f64>>, EffectError> {
+                    let mut plant = plant_pushed(self.model, effects, side, s.dt, &s.pushed)?;
+                    let rest = plant.residuals(&Motion { tau, held: None, ..s.motion(self.model, self.standstill) });
+                    let less = |(tau, rest): (&Vec<f64>, &Vec<f64>)| tau.iter().zip(rest).map(|(t, r)| t - r).collect();
+                    Ok(tau.iter().zip(&rest).map(less).collect())
+                };
+                Ok(Signals {
+                    load: Some(torque(&effects, if crossed { &s.tau } else { &idle })?),
+                    taken: Some(torque(&taken, if crossed { &s.tau } else { &idle })?),
+                    ..s.clone()
+                })
             })
             .collect()
     }
@@ -151,7 +149,7 @@ impl Data<'_> {
         let mut curvature: Option<Vec<Vec<Vec<f64>>>> = None;
         let bends = candidates.iter().any(|c| BENT.contains(&c.kind));
         let least = if bends { ROUNDS_FOR_BENT } else { 1 };
-        let loads = candidates.iter().any(|c| c.kind == Kind::LoadDependentFriction);
+        let loads = candidates.iter().any(Candidate::reads_torque);
         let mut loaded: Option<Vec<Signals>> = None;
         let mut round = 0;
         loop {
@@ -185,6 +183,7 @@ impl Data<'_> {
             }
             if round >= ROUNDS || (round >= least && change < SETTLED) {
                 data.break_away(&mut problem, &fit)?;
+                problem.split(self.band);
                 return Ok((problem, fit));
             }
             let mut at = fit.clone();

@@ -32,6 +32,9 @@ pub struct Diagnosis {
     pub effects: Vec<FoundEffect>,
     /// Other sets of effects that the logs do not exclude.
     pub alternatives: Vec<Alternative>,
+    /// The comparisons that decided.
+    #[serde(default)]
+    pub why: Vec<Why>,
     /// What is left after the effects.
     pub unexplained: Unexplained,
     /// How far the gap shrinks on held-out data with all effects together.
@@ -41,6 +44,22 @@ pub struct Diagnosis {
     /// The least size of each effect that these logs would have revealed; an extension of the schema.
     #[serde(default)]
     pub power: Vec<Power>,
+}
+
+/// One comparison of two accounts of the logs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Why {
+    /// Kind that was proposed.
+    pub proposed: String,
+    /// Its joints, where it was tried at some alone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<String>,
+    /// What it was held against.
+    pub against: String,
+    /// By how many nats the logs speak for it; below zero they speak against it.
+    pub odds: f64,
+    /// Whether it was taken.
+    pub taken: bool,
 }
 
 /// The least size of an effect that the logs would have revealed beside the effects found.

@@ -1,47 +1,32 @@
 //! The search: which effects, at which parameters, from a first look at all of them to what the plant itself predicts.
 
-use crate::constancy;
+use crate::climb::{self, Choice, Competition, LATE, Rival};
 use crate::corrected::residual;
 use crate::diagnose::{Logs, Progress};
-use crate::drive::STANDS_IN;
 use crate::estimate::Fit;
 use crate::floor::noise_floor;
 use crate::gap;
-use crate::limits;
 use crate::problem::{Entry, Problem, Term};
 use crate::refine::Data;
 use crate::screen;
-use crate::select::{self, Choice};
 use crate::signals::Signals;
-use crate::verdict::Judged;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, EffectError, Kind, Plant, Range};
 use rayon::prelude::*;
 
-/// So many kinds side by side, some of them flexible, must predict better than the linear kinds alone.
-const MANY: usize = 3;
-/// Laws outside the catalogue, limits that are reached now and then, and Stribeck friction for what motion alone shows as
-/// Coulomb friction are let in where with them this part of what is more than noise is left.
-const OPEN: f64 = 0.75;
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
-/// Kinds that reach joints where they find nothing to explain, or with one coefficient for all that a joint carries can
-/// promise more than they keep.
-const REACHING: [Kind; 6] = [
-    Kind::Payload,
-    Kind::LinkInertiaError,
-    Kind::GravityMisalignment,
-    Kind::TorqueGainError,
-    Kind::ActuationDelay,
-    Kind::ActuatorLag,
-];
+/// Times that a likelier account takes the place of what was chosen.
+const AGAIN: usize = 2;
+/// A kind without which the logs are less likely by no more than this, nats, is looked at again: what was chosen around it may
+/// have been chosen because of it.
+const DOUBTFUL: f64 = 60.0;
+/// Nats that a spring or play must bring beside its rotor: as rare as any kind, on either side of the gear, a knob that the
+/// logs know to a twentieth of its range, and what the best of some hundred tries finds in noise.
+const TURNS: f64 = 3.0 + 0.7 + 3.0 + 9.0;
 
-/// Part of the effort's variation below which neither a drive nor a law outside the catalogue is looked for.
-const UNNOTICED: f64 = 2e-3;
-/// Part of the squared gap that must be left for a drive to be looked for near the noise floor.
-const ALL_BUT: f64 = 1e-3;
-/// What a kind more must take away, relative, where two sets with a drive are compared.
-pub(crate) const A_KIND: f64 = 0.02;
+/// What joints bear at rest beyond friction: `[joint][row]`, N m or N.
+type Borne = Vec<Vec<Option<f64>>>;
 
 /// What the search came to.
 pub(crate) struct Chosen {
@@ -59,21 +44,10 @@ pub(crate) struct Chosen {
     pub turned: Option<Turned>,
     /// Probability that a delay is a lag, or a lag a delay, where one is there and they were compared.
     pub late_doubt: Option<f64>,
-}
-
-/// A choice held against the plant.
-struct Tried {
-    chosen: Chosen,
-    /// Kinds of its set.
-    kinds: Vec<Kind>,
-    /// Held-out gap with it against the noise, as a part of the effort's variation.
-    judged: Judged,
-}
-
-impl Tried {
-    fn left(&self) -> f64 {
-        self.judged.all.after
-    }
+    /// Springs and plays that were held against a rigid drive, and by how many nats each won.
+    pub tried: Vec<(Candidate, f64)>,
+    /// By how many nats the logs, held against the exact law, speak for each kind beyond calibration.
+    pub needed: Vec<(Kind, f64)>,
 }
 
 /// A drive that turns on its own.
@@ -83,194 +57,280 @@ pub(crate) struct Turned {
     pub place: usize,
     /// Spring or play, its knob known.
     pub drive: Candidate,
-    /// Probability that the drive is rigid.
-    pub doubt: f64,
+    /// By how many nats the best account with a rigid drive is less likely.
+    pub odds: f64,
+}
+
+impl Chosen {
+    /// By how many nats this account of the logs is likelier than another, each at its exact law.
+    pub fn odds_against(&self, other: &Chosen, logs: &Logs<'_>) -> Result<f64, EffectError> {
+        // What is left of the better account is nearer to noise: it says how many rows count as one.
+        let counts: Vec<f64> =
+            self.exact.correlation().iter().zip(other.exact.correlation()).map(|(a, b)| a.min(*b)).collect();
+        let (own, own_borne) = logs.noise_through(self)?;
+        let (others, others_borne) = logs.noise_through(other)?;
+        let evidence = |chosen: &Chosen| chosen.exact.evidence(&chosen.fit, &counts, &logs.band);
+        let (mut evidence, mut others_evidence) = (evidence(self), evidence(other));
+        let least: Vec<f64> =
+            evidence.noise.iter().zip(&others_evidence.noise).map(|(own, other)| own.min(*other)).collect();
+        evidence.at_rest(&own_borne, &least, &counts, &logs.band);
+        others_evidence.at_rest(&others_borne, &least, &counts, &logs.band);
+        // A law that filters what was measured makes more or less of its noise, and leaves more or less for that alone. One with
+        // blows makes anything of it.
+        let differ = |a: &Chosen, b: &Chosen| {
+            let has = |e: &Entry| b.exact.entries.iter().any(|other| other.candidate == e.candidate);
+            a.exact.entries.iter().any(|e| e.candidate.filters() && !has(e))
+        };
+        let filtered = (differ(self, other) || differ(other, self)) && !self.blows() && !other.blows();
+        let quieter: f64 = (0..own.len())
+            .filter(|&j| filtered && own[j] > 0.0 && others[j] > 0.0)
+            .map(|j| self.exact.rows(j) / counts[j] * (others[j] / own[j]).ln())
+            .sum();
+        Ok(evidence.against(&others_evidence, quieter) + self.prior() - other.prior())
+    }
+
+    /// Log probability of the account before any log is seen.
+    fn prior(&self) -> f64 {
+        let drive = if self.turns() { TURNS + (self.noise.len() as f64).ln() } else { 0.0 };
+        Competition::new(&self.all).prior(&self.choice.set) - drive
+    }
+
+    /// The same with another choice among its candidates.
+    pub(crate) fn with(&self, choice: Choice, exact: Problem, fit: Fit) -> Chosen {
+        Chosen {
+            all: self.all.clone(),
+            choice,
+            exact,
+            fit,
+            noise: self.noise.clone(),
+            turned: self.turned.clone(),
+            late_doubt: None,
+            tried: self.tried.clone(),
+            needed: self.needed.clone(),
+        }
+    }
+
+    /// Whether a drive in it hits a stop, from which noise comes back as blows.
+    fn blows(&self) -> bool {
+        self.exact.entries.iter().any(|e| e.candidate.blows())
+    }
+
+    fn turns(&self) -> bool {
+        self.exact.entries.iter().any(|e| e.candidate.turns())
+    }
 }
 
 impl Logs<'_> {
-    /// The problem of all candidates, the set chosen from it, and the problem of that set alone at its exact parameters.
-    ///
-    /// What the normal equations promise is held against the torque that the plant really predicts on held-out data. Where
-    /// many kinds stand together or leave much, flexible laws may have bent to what none of them is: then the linear kinds
-    /// alone have their turn, and where they predict as well with no more of them, so has the set without each of its kinds.
-    /// Where more than noise is left, laws outside the catalogue compete, so that effects are chosen beside what they do not
-    /// explain instead of bent to it; then drives are looked for, and beside a drive those laws once more. A set that makes
-    /// the gap larger, or that of one joint much larger, is no explanation: then the next choice does without the kinds that
-    /// promise most.
-    pub(crate) fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
-        let before = gap::total(&gap::squares(&self.band, &self.nominal_rows(), |_| true));
-        // What the set leaves, beside what laws outside the catalogue in it account for.
-        let tried = |chosen: Chosen| -> Result<Tried, EffectError> {
-            let after = self.left_by_joint(&chosen.exact, &chosen.fit.set)?;
-            let judged = Judged::new(&before, &after, &chosen.noise, &weights, &chosen.exact.turning(&chosen.fit.set));
-            Ok(Tried { kinds: select::kinds(&chosen.exact, &chosen.fit.set), judged, chosen })
+    /// Root mean square of what the noise of the logs makes of the rows of each joint behind an account, N m or N, and what
+    /// joints bear at rest beyond its friction.
+    fn noise_through(&self, chosen: &Chosen) -> Result<(Vec<f64>, Borne), EffectError> {
+        let rest = |signals: &[Signals]| Data { signals, ..self.data(&chosen.noise) }.rest(&chosen.exact, &chosen.fit);
+        let plain = rest(&self.signals)?;
+        let borne = (0..self.model.dof()).map(|j| self.at_rest(j, &plain)).collect();
+        if self.noisier.len() != self.signals.len() {
+            return Ok((vec![0.0; self.model.dof()], borne));
+        }
+        let rows = |rest: &[Vec<Vec<f64>>]| gap::at_rows(&self.band, rest, self.model.dof());
+        let size = |(a, b): (&Vec<f64>, &Vec<f64>)| {
+            let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
+            (square / a.len().max(1) as f64).sqrt()
         };
-        let without = |kinds: &[Kind]| -> Result<Tried, EffectError> {
-            tried(self.choose_among(&[kinds, &Kind::OUTSIDE].concat(), progress)?)
-        };
-        let mut best = without(&[])?;
-        let floor = best.judged.all.floor;
-        let beyond = |tried: &Tried| (tried.left().powi(2) - floor.powi(2)).max(0.0).sqrt();
-        if best.judged.leaves_much() {
-            // Rows beyond a limit that is reached now and then pass for outliers, unless limits have a say in that.
-            let weighed_by = [weighing(), vec![Kind::TorqueSaturation]].concat();
-            let limited = self.best_of(&Kind::OUTSIDE, &weighed_by, progress)?;
-            let limited = if limits::hold(&limited) { Some(tried(limited)?) } else { None };
-            best = limited.filter(|limited| beyond(limited) < OPEN * beyond(&best)).unwrap_or(best);
-        }
-        let every = best.chosen.all.clone();
-        let flexible: Vec<Kind> = Kind::ALL.into_iter().filter(|k| !Kind::LINEAR.contains(k)).collect();
-        let bends = best.kinds.iter().any(|kind| flexible.contains(kind));
-        if bends && (best.kinds.len() >= MANY || best.judged.leaves_much()) {
-            let linear = without(&flexible)?;
-            if linear.left() <= best.left() && linear.kinds.len() <= best.kinds.len() {
-                // One kind may have spoilt the others: each in turn does without.
-                let level = |tried: &Tried| tried.left() * (1.0 + A_KIND * tried.kinds.len() as f64);
-                for kind in std::mem::replace(&mut best, linear).kinds {
-                    let rest = without(&[kind])?;
-                    if level(&rest) < level(&best) {
-                        best = rest;
-                    }
-                }
-            }
-        }
-        if best.judged.leaves_any()
-            && let Some(sticking) = self.sticking(&best.chosen, every)?
-        {
-            let sticking = tried(sticking)?;
-            best = if beyond(&sticking) < OPEN * beyond(&best) { sticking } else { best };
-        }
-        let mut open = None;
-        let mut laws = None;
-        if best.judged.leaves_any() && best.left() > UNNOTICED {
-            let found = tried(self.choose_among(&[], progress)?)?;
-            laws = Some(found.chosen.all.clone());
-            open = Some(found).filter(|open| beyond(open) < OPEN * beyond(&best));
-        }
-        let much = best.judged.leaves_much();
-        // Joints whose drive is worth a look: all where anything is left, and else those whose rotor was found, which is a
-        // part of such a drive.
-        let drives = |tried: &Tried| -> Vec<usize> {
-            let stands_in = tried.kinds.iter().any(|kind| STANDS_IN.contains(kind));
-            let explained_otherwise = stands_in && tried.judged.unexplained_fraction() > ALL_BUT;
-            let all = tried.left() > UNNOTICED && (tried.judged.leaves_any() || explained_otherwise);
-            let rotors = tried.chosen.exact.entries.iter().filter(|e| e.candidate.kind == Kind::Armature);
-            let rotors: Vec<usize> = rotors.flat_map(|e| e.candidate.joints.iter().copied()).collect();
-            (0..self.model.dof()).filter(|j| self.moving[*j] && (all || rotors.contains(j))).collect()
-        };
-        if open.as_ref().is_none_or(|open| open.judged.leaves_any()) {
-            let joints = drives(&best);
-            best = tried(self.drive(best.chosen, &joints, progress)?)?;
-        }
-        if let Some(found) = open.take_if(|open| open.left() < best.left()) {
-            let joints = drives(&found);
-            open = Some(tried(self.drive(found.chosen, &joints, progress)?)?);
-        }
-        // What such a drive covered has its turn beside it.
-        if let (Some(laws), Some(turned)) = (laws, &best.chosen.turned)
-            && best.judged.leaves_any()
-            && best.left() > UNNOTICED
-            && let Some(beside) = self.beside(&best.chosen, turned, laws, progress)?
-        {
-            let beside = tried(beside)?;
-            let least = open.as_ref().map_or(f64::INFINITY, beyond).min(OPEN * beyond(&best));
-            open = if beyond(&beside) < least { Some(beside) } else { open };
-        }
-        if let Some(open) = open.filter(|open| open.left() < best.left()) {
-            // Beside laws that leave nothing but noise, noise is all that could tell an effect from itself.
-            let doubt = much && open.judged.leaves_any();
-            return self.constant(open.chosen, doubt, |_| true);
-        }
-        let constant = |Tried { chosen, judged, .. }: Tried| {
-            self.constant(chosen, judged.leaves_much(), |candidate| judged.doubts(&candidate.joints))
-        };
-        if best.kinds.is_empty() || !best.judged.spoils() {
-            return constant(best);
-        }
-        let modest = without(&REACHING)?;
-        if modest.kinds.is_empty() || !modest.judged.spoils() {
-            return constant(modest);
-        }
-        let choice = select::evaluate(&modest.chosen.all, Vec::new());
-        let (exact, fit) = self.data(&modest.chosen.noise).refine(&[])?;
-        Ok(Chosen { choice, exact, fit, ..modest.chosen })
+        let (plain, noisier) = (rows(&plain), rows(&rest(&self.noisier)?));
+        Ok((plain.iter().zip(&noisier).map(size).collect(), borne))
     }
 
-    /// Takes out the effects that fall apart when they are fitted to a part of the rows, worst first, where much is left:
-    /// those in doubt by regime, all by what changes slowly and fast.
-    fn constant(
-        &self,
-        mut chosen: Chosen,
-        much: bool,
-        doubt: impl Fn(&Candidate) -> bool,
-    ) -> Result<Chosen, EffectError> {
-        while much
-            && let Some(&(worst, _)) =
-                constancy::inconsistent(&chosen.exact, &chosen.fit, &self.signals, &self.band, &doubt).first()
-        {
-            chosen.choice.set.remove(worst);
-            let (exact, fit) =
-                self.data(&chosen.noise).refine(&with_drive(&chosen.all, &chosen.choice.set, &chosen.turned))?;
-            let choice = select::evaluate(&chosen.all, chosen.choice.set);
-            chosen = Chosen { exact, fit, choice, ..chosen };
+    /// What is left of a joint at the rows at which it rests, N m or N.
+    fn at_rest(&self, joint: usize, rest: &[Vec<Vec<f64>>]) -> Vec<Option<f64>> {
+        let rows = self.signals.iter().zip(rest).enumerate().flat_map(|(e, (s, rest))| {
+            let still: Vec<bool> = s.v[joint].iter().map(|v| v.abs() < self.still[joint]).collect();
+            self.band.filter_where(e, &still, &rest[joint])
+        });
+        rows.collect()
+    }
+
+    /// What was chosen, with Stribeck friction in the place of its Coulomb friction where that is likelier: the rise towards
+    /// rest of a joint that leaves rest too fast shows in what it bears there, and in no row of its motion.
+    fn sticking(&self, chosen: Chosen) -> Result<Chosen, EffectError> {
+        let of = |c: usize| &chosen.all.entries[c].candidate;
+        let rest = self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?;
+        let bears = |c: usize| {
+            let bears = |j: &usize| {
+                let beyond = 3.0 * chosen.exact.sigma[*j];
+                self.at_rest(*j, &rest).into_iter().flatten().any(|x| x.abs() > beyond)
+            };
+            of(c).joints.iter().any(bears)
+        };
+        let sticks = |c: usize| -> usize {
+            let shapes: Vec<usize> = (0..chosen.all.entries.len())
+                .filter(|&other| of(other).kind == Kind::StribeckFriction && of(other).joints == of(c).joints)
+                .collect();
+            shapes.get(shapes.len() / 2).copied().unwrap_or(c)
+        };
+        let slides = |c: usize| of(c).kind == Kind::CoulombFriction && bears(c);
+        let mut set: Vec<usize> = chosen.choice.set.iter().map(|&c| if slides(c) { sticks(c) } else { c }).collect();
+        set.sort_unstable();
+        if set == chosen.choice.set {
+            return Ok(chosen);
+        }
+        let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
+        let sticking = chosen.with(Choice { set }, exact, fit);
+        Ok(if sticking.odds_against(&chosen, self)? > 0.0 { sticking } else { chosen })
+    }
+
+    /// The problem of all candidates, the set chosen from it, and the problem of that set alone at its exact parameters.
+    pub(crate) fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let chosen = self.best_of(progress)?;
+        let chosen = self.delay_or_lag(chosen)?;
+        let chosen = self.drive(chosen, progress)?;
+        let chosen = self.likeliest(chosen, progress)?;
+        let chosen = self.needed(self.shown(chosen, progress)?, progress)?;
+        let chosen = self.sticking(chosen)?;
+        self.delay_or_lag(chosen)
+    }
+
+    /// The likeliest account: where the best one without a kind is likelier than what was chosen, that one.
+    fn likeliest(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        for _ in 0..AGAIN {
+            let mut rivals = climb::rivals(&chosen.all, &chosen.choice);
+            rivals.sort_by(|a, b| a.odds.total_cmp(&b.odds));
+            let Some(rival) = rivals.into_iter().next().filter(|rival| rival.odds < 0.0) else { break };
+            let turned = chosen.turned.clone().filter(|turned| rival.choice.set.contains(&turned.place));
+            let next = self.converge(chosen.all.clone(), rival.choice, chosen.noise.clone(), turned, progress)?;
+            if next.odds_against(&chosen, self)? <= 0.0 {
+                break;
+            }
+            chosen = Chosen { tried: chosen.tried, ..next };
         }
         Ok(chosen)
     }
 
-    /// The best set without some kinds; limits have no place in it where they leave much of what they cut.
-    fn choose_among(&self, forbidden: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        let chosen = self.best_of(forbidden, &weighing(), progress)?;
-        if limits::hold(&chosen) {
-            return Ok(chosen);
+    /// What was chosen, each kind in it held at its exact law against the best accounts without it: without replacement, and
+    /// with whatever else takes its place. A kind that the logs do not speak for goes.
+    fn needed(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let own = chosen.turned.as_ref().map(|turned| turned.place);
+        let rivals = climb::rivals(&chosen.all, &chosen.choice);
+        for kind in climb::kinds(&chosen.all, &chosen.choice.set) {
+            let rival = rivals.iter().find(|rival| rival.without == kind);
+            let of_kind = |c: &usize| chosen.all.entries[*c].candidate.kind == kind && Some(*c) != own;
+            let set: Vec<usize> = chosen.choice.set.iter().copied().filter(|c| !of_kind(c)).collect();
+            let clear = kind.is_calibration() && rival.is_some_and(|rival| rival.odds > DOUBTFUL);
+            if set.len() == chosen.choice.set.len() || clear {
+                continue;
+            }
+            let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
+            let without = chosen.with(Choice { set }, exact, fit);
+            let mut odds = chosen.odds_against(&without, self)?;
+            if odds <= 0.0 {
+                chosen = without;
+                continue;
+            }
+            let doubtful = |rival: &&Rival| !kind.is_calibration() && odds.min(rival.odds) < DOUBTFUL;
+            if let Some(rival) = rival.filter(doubtful) {
+                let mut all = chosen.all.clone();
+                // A delay and a lag are told apart by other means.
+                all.closed.extend(if LATE.contains(&kind) { LATE.to_vec() } else { vec![kind] });
+                let choice = rival.choice.clone();
+                let next = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
+                let next = if next.turned.is_none() { self.drive(next, progress)? } else { next };
+                let over = chosen.odds_against(&next, self)?;
+                if over < 0.0 {
+                    let closed = std::mem::take(&mut chosen.all.closed);
+                    chosen = Chosen { tried: chosen.tried, needed: chosen.needed, ..next };
+                    chosen.all.closed = closed;
+                    continue;
+                }
+                odds = odds.min(over);
+            }
+            chosen.needed.push((kind, odds));
         }
-        self.best_of(&[forbidden, &[Kind::TorqueSaturation]].concat(), &weighing(), progress)
+        Ok(chosen)
     }
 
-    /// The best set without some kinds, rows weighed by what all those of others leave.
-    fn best_of(&self, forbidden: &[Kind], weighed_by: &[Kind], progress: Progress<'_>) -> Result<Chosen, EffectError> {
+    /// What was chosen without the candidates beyond calibration of which every interval holds nothing: what blocks of time do
+    /// not agree on was not shown by them. Where nothing of a kind is left, what else there is has its turn without it.
+    fn shown(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        for kind in climb::kinds(&chosen.all, &chosen.choice.set) {
+            if kind.is_calibration() || kind.is_outside() {
+                continue;
+            }
+            let half = chosen.fit.half_widths(&chosen.exact);
+            let holds_nothing = |i: usize| {
+                let (at, theta) = chosen.fit.own(&chosen.exact, i);
+                at.iter().zip(theta).all(|(&i, theta)| theta.abs() < half[i])
+            };
+            // Candidates of a choice and entries at its exact law stand in one order.
+            let of_kind = |i: usize| {
+                let candidate = &chosen.exact.entries[i].candidate;
+                candidate.kind == kind && !candidate.turns()
+            };
+            let own: Vec<usize> = (0..chosen.exact.entries.len()).filter(|&i| of_kind(i)).collect();
+            let gone: Vec<usize> = own.iter().copied().filter(|&i| holds_nothing(i)).collect();
+            if gone.is_empty() {
+                continue;
+            }
+            let set =
+                chosen.choice.set.iter().enumerate().filter(|(i, _)| !gone.contains(i)).map(|(_, &c)| c).collect();
+            let choice = Choice { set };
+            if gone.len() < own.len() {
+                let candidates = with_drive(&chosen.all, &choice.set, &chosen.turned);
+                let (exact, fit) = self.data(&chosen.noise).refine(&candidates)?;
+                chosen = chosen.with(choice, exact, fit);
+                continue;
+            }
+            let mut all = chosen.all.clone();
+            all.closed.push(kind);
+            let next = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
+            chosen = Chosen { tried: chosen.tried, needed: chosen.needed, ..next };
+        }
+        Ok(chosen)
+    }
+
+    /// The best set of rigid drives.
+    fn best_of(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let residuals: Vec<Vec<Vec<f64>>> = self
             .signals
             .par_iter()
             .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
             .collect();
-        let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof(), 0.0);
+        let noise = noise_floor(&self.signals, &self.band, &residuals, self.model.dof());
         let data = self.data(&noise);
         let mut candidates = Candidate::all(self.model);
         let ranges = ranges(self.model, &self.signals);
         candidates.extend(Candidate::knobs(&ranges));
         let limits = self.limits(&ranges);
+        // What acts on the effort is told by the torque that the motion takes: of a used arm, not that of its URDF.
+        let term = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
+        let calibration: Vec<Term> = candidates.iter().filter(|c| c.kind.is_calibration()).map(term).collect();
+        let at: Vec<usize> = (0..calibration.len()).collect();
+        let calibrated = data.problem(calibration, &Kind::ALL);
+        let at: Vec<usize> = at.into_iter().take(calibrated.entries.len()).collect();
+        let loaded = data.loaded(&calibrated, &Fit::on_all(&calibrated, &at))?;
+        let data = Data { signals: &loaded, ..data };
         candidates.retain(|c| c.kind != Kind::TorqueSaturation || limits[c.joints[0]].contains(&c.shape));
-        let open = Kind::OUTSIDE.iter().any(|kind| !forbidden.contains(kind));
-        let outside = if open { Candidate::outside(self.model) } else { Vec::new() };
+        let outside = Candidate::outside(self.model);
         candidates.extend(screen::ripples(&data, &ranges, &residuals, &outside));
-        if open {
-            candidates.extend(screen::places(&data, &ranges, &residuals, &outside));
-        }
+        candidates.extend(screen::places(&data, &ranges, &residuals, &outside));
         candidates.extend(outside);
         if self.signals.iter().any(|s| !s.pushed.is_empty()) {
             candidates.extend(Candidate::contacts(self.model));
         }
-        candidates.retain(|c| !forbidden.contains(&c.kind));
-        let term = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
-        let mut all = data.problem(candidates.iter().map(term).collect(), weighed_by);
+        let mut all = data.problem(candidates.iter().map(term).collect(), &weighing());
         progress("choosing effects", 0.2);
-        let choice = select::choose(&mut all, &self.band, &[]);
-        self.converge(all, choice.set, noise, None, progress)
+        let choice = climb::choose(&mut all, &self.band, &[]);
+        self.converge(all, choice, noise, None, progress)
     }
 
     /// From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
     pub(crate) fn converge(
         &self,
         mut all: Problem,
-        set: Vec<usize>,
+        mut choice: Choice,
         noise: Vec<f64>,
         turned: Option<Turned>,
         progress: Progress<'_>,
     ) -> Result<Chosen, EffectError> {
         let data = self.data(&noise);
         let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
-        let mut choice = select::evaluate(&all, set);
         let mut round = 0;
         loop {
             progress("refining effects", 0.3 + 0.08 * round as f64);
@@ -285,12 +345,22 @@ impl Logs<'_> {
                 .map(|(&c, e)| (c, e.candidate.clone()))
                 .collect();
             if round == ROUNDS || choice.set.is_empty() {
-                return Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt: None });
+                return Ok(Chosen {
+                    all,
+                    choice,
+                    exact,
+                    fit,
+                    noise,
+                    turned,
+                    late_doubt: None,
+                    tried: Vec::new(),
+                    needed: Vec::new(),
+                });
             }
             // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
             let loaded = data.loaded(&exact, &fit)?;
             let data = Data { signals: &loaded, ..data };
-            let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind == Kind::LoadDependentFriction;
+            let of_load = |(_, e): &(usize, &Entry)| e.candidate.reads_torque();
             let under_load = all.entries.iter().enumerate().filter(of_load);
             let changes: Vec<(usize, Candidate)> =
                 under_load.map(|(c, e)| (c, e.candidate.clone())).chain(changes).collect();
@@ -301,11 +371,21 @@ impl Logs<'_> {
             carry(&fit, &exact, &plain, &mut plain_fit);
             let curvature = data.curvature(&plain, &plain_fit)?;
             all.bend(&self.signals, &self.band, &self.still, &curvature);
-            let again = select::choose(&mut all, &self.band, &choice.set);
+            let again = climb::choose(&mut all, &self.band, &choice.set);
             let same = again.set == choice.set;
             choice = again;
             if same {
-                return Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt: None });
+                return Ok(Chosen {
+                    all,
+                    choice,
+                    exact,
+                    fit,
+                    noise,
+                    turned,
+                    late_doubt: None,
+                    tried: Vec::new(),
+                    needed: Vec::new(),
+                });
             }
         }
     }
@@ -313,7 +393,7 @@ impl Logs<'_> {
 
 /// Kinds by what all of which leave rows are weighed. A push is known by when it comes: it is no outlier.
 pub(crate) fn weighing() -> Vec<Kind> {
-    [&Kind::LINEAR[..], &Kind::OUTSIDE, &[Kind::ExternalContact]].concat()
+    [&Kind::LINEAR[..], &Kind::OUTSIDE, &LATE, &[Kind::ExternalContact]].concat()
 }
 
 /// The candidates of a set, a drive in the place of its rotor.

@@ -10,11 +10,14 @@ use gapscope_datasets::{Episode, Uniform, resample};
 use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{Held, Motion};
 use gapscope_rollout::Trajectory;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
 
 /// Half-width of the kernel that forms derivatives, s; about 46 Hz.
 const DERIVATIVE_HALF_WIDTH: f64 = 0.010;
 /// The same in samples at least, so that derivatives of slow logs are smoothed too.
-const DERIVATIVE_REACH: f64 = 5.0;
+const DERIVATIVE_REACH: f64 = 2.5;
 /// Fraction of a joint's rms speed below which it counts as standing: its sign is then mostly noise and transients.
 const STANDSTILL_FRACTION: f64 = 0.03;
 /// Speeds under this many standard deviations of their noise count as standing.
@@ -51,6 +54,8 @@ pub struct Signals {
     pub nominal: Vec<Vec<f64>>,
     /// Torque that loads the gears, N m or N, where it is known better than from the nominal robot.
     pub load: Option<Vec<Vec<f64>>>,
+    /// Torque that the motion takes with what was found, N m or N, where that is known.
+    pub taken: Option<Vec<Vec<f64>>>,
     /// Standard deviation of the white noise of each joint's position, rad or m.
     pub position_noise: Vec<f64>,
     /// Standard deviation of the noise of each joint's velocity, rad/s or m/s.
@@ -118,6 +123,7 @@ impl Signals {
             tau_rate,
             nominal: vec![Vec::with_capacity(length); n],
             load: None,
+            taken: None,
             position_noise,
             velocity_noise,
             effort_noise,
@@ -126,6 +132,38 @@ impl Signals {
         };
         signals.fill_nominal(model);
         Some(signals)
+    }
+
+    /// Signals of the same run with white noise of the size that its own noise has on position and effort once more.
+    pub fn noisier(&self, model: &Model, episode: &Episode, seed: u64) -> Option<Signals> {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let mut episode = episode.without_glitches();
+        for (channel, sizes) in
+            [(&mut episode.position, &self.position_noise), (&mut episode.effort, &self.effort_noise)]
+        {
+            for (x, size) in channel.iter_mut().zip(sizes) {
+                x.iter_mut().for_each(|x| *x += size * random.sample::<f64, _>(StandardNormal));
+            }
+        }
+        let signals = Signals::new(model, &episode)?;
+        Some(Signals { pushed: self.pushed.clone(), ..signals })
+    }
+
+    /// Rate of the torque that the motion takes of a joint, N m/s or N/s. The noise of the effort is not in it.
+    pub fn taken_rate(&self, joint: usize) -> Vec<f64> {
+        let taken = &self.taken.as_ref().unwrap_or(&self.nominal)[joint];
+        let at = |k: usize| taken[k.min(taken.len() - 1)];
+        (0..taken.len()).map(|k| (at(k + 1) - at(k.saturating_sub(1))) / (2.0 * self.dt)).collect()
+    }
+
+    /// The samples at which a joint slides. A slow log is smoothed so widely that its effort before and after a reversal runs
+    /// together: there the sign of the speed says nothing for as long.
+    pub fn slides(&self, joint: usize, standstill: f64) -> Vec<bool> {
+        let stands: Vec<bool> = self.v[joint].iter().map(|v| v.abs() < standstill).collect();
+        let wide = (self.held.len() as f64 / 2.0 - 1.0) * self.raw.dt - DERIVATIVE_HALF_WIDTH;
+        let reach = (wide / self.dt).round().max(0.0) as usize;
+        let near = |k: usize| stands[k.saturating_sub(reach)..(k + reach + 1).min(stands.len())].iter().any(|s| *s);
+        (0..stands.len()).map(|k| !near(k)).collect()
     }
 
     /// Number of signals.
@@ -160,6 +198,7 @@ impl Signals {
             tau: &self.tau,
             nominal: &self.nominal,
             load: self.load.as_ref().unwrap_or(&self.nominal),
+            taken: self.taken.as_ref().unwrap_or(&self.nominal),
             effort_noise: &self.effort_noise,
             held: Some(Held {
                 effort: &self.effort,

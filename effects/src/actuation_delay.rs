@@ -4,7 +4,7 @@
 //! Source: Åström, Wittenmark, Computer-Controlled Systems (1997) (sampling a system with a time delay).
 
 use crate::effect::{Law, Value, check};
-use crate::filter::late;
+use crate::filter::early;
 use crate::signature::Column;
 use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
@@ -37,14 +37,11 @@ impl Law for ActuationDelay {
     }
 }
 
-/// One column at a delay: the effort less the delayed one, over the delay, on every joint. Coefficient: the delay.
+/// One column at a delay: the torque that the motion takes, as much later, less that of now, over the delay, on every joint.
+/// Coefficient: the delay.
 pub(crate) fn signature(motion: &Motion, delay: f64) -> Vec<Column> {
-    vec![changed(motion, delay, |x| late(x, delay, motion.dt))]
-}
-
-/// What an operator on every joint's effort takes away from it, per unit of its parameter.
-pub(crate) fn changed(motion: &Motion, parameter: f64, operator: impl Fn(&[f64]) -> Vec<f64>) -> Column {
-    let less = |x: &Vec<f64>| x.iter().zip(operator(x)).map(|(x, y)| (x - y) / parameter).collect();
-    let rows = motion.tau.iter().map(less).enumerate().collect();
-    Column { rows, at_least: 0.0, at_most: 1.0 }
+    let change =
+        |x: &Vec<f64>| early(x, delay, motion.dt).iter().zip(x).map(|(then, now)| (then - now) / delay).collect();
+    let rows = motion.taken.iter().map(change).enumerate().collect();
+    vec![Column { rows, at_least: 0.0, at_most: 1.0 }]
 }

@@ -3,9 +3,8 @@
 //! T u̇ = τ − u, τ_effective = u.
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), chapter 5 (the drive's current loop).
 
-use crate::actuation_delay::changed;
 use crate::effect::{Law, Value, check};
-use crate::filter::first_order;
+use crate::filter::first_derivative;
 use crate::signature::Column;
 use crate::{EffectError, Kind, Motion, Plant};
 use serde::{Deserialize, Serialize};
@@ -44,8 +43,11 @@ impl Law for ActuatorLag {
     }
 }
 
-/// One column at a time constant: the effort less the lagged one, over the time constant, on every joint. Coefficient:
-/// the time constant.
-pub(crate) fn signature(motion: &Motion, time_constant: f64) -> Vec<Column> {
-    vec![changed(motion, time_constant, |x| first_order(x, time_constant, motion.dt))]
+/// One column: the rate of the torque that the motion takes, on every joint. Coefficient: the time constant.
+///
+/// The effort that is to be logged for a torque m is m + T ṁ. The other way round, the lagged effort against m, a lag would
+/// smooth the noise of the effort and so explain some of it.
+pub(crate) fn signature(motion: &Motion) -> Vec<Column> {
+    let rows = motion.taken.iter().map(|x| first_derivative(x, motion.dt)).enumerate().collect();
+    vec![Column { rows, at_least: 0.0, at_most: 1.0 }]
 }

@@ -8,6 +8,14 @@ pub(crate) fn late(x: &[f64], delay: f64, dt: f64) -> Vec<f64> {
     (0..x.len()).map(|k| at(k, whole) + fraction * (at(k, whole + 1) - at(k, whole))).collect()
 }
 
+/// A signal `time` s earlier, linear between samples; what lies behind the last sample is taken as the last.
+pub(crate) fn early(x: &[f64], time: f64, dt: f64) -> Vec<f64> {
+    let steps = (time / dt).max(0.0);
+    let (whole, fraction) = (steps.floor() as usize, steps.fract());
+    let at = |k: usize| x[k.min(x.len() - 1)];
+    (0..x.len()).map(|k| at(k + whole) + fraction * (at(k + whole + 1) - at(k + whole))).collect()
+}
+
 /// Response of a first-order lag to a signal that is linear between samples, exact; it starts as if the signal had been
 /// constant before.
 pub(crate) fn first_order(x: &[f64], time_constant: f64, dt: f64) -> Vec<f64> {

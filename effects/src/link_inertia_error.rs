@@ -65,18 +65,18 @@ impl Law for LinkInertiaError {
 
 impl LinkInertiaError {
     /// The ten parameters in the order of the regressor.
-    fn coefficients(&self) -> [f64; 10] {
+    pub(crate) fn coefficients(&self) -> [f64; 10] {
         let ([x, y, z], [xx, xy, yy, xz, yz, zz]) = (self.first_moment_delta, self.inertia_delta);
         [self.mass_delta, x, y, z, xx, xy, yy, xz, yz, zz]
     }
 }
 
 /// What a link may be off by from its URDF, as standard deviations: mass, as a part of it, ...
-const MASS: f64 = 0.3;
+const MASS: f64 = 0.15;
 /// ... centre of mass, m, ...
-const CENTER: f64 = 0.03;
+const CENTER: f64 = 0.015;
 /// ... and inertia, as a part of it.
-const INERTIA: f64 = 0.5;
+const INERTIA: f64 = 0.3;
 /// Least mass that a link is taken to have, as a part of the robot's: some URDFs have links without inertia.
 const LEAST: f64 = 0.01;
 

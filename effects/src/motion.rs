@@ -23,6 +23,9 @@ pub struct Motion<'a> {
     pub nominal: &'a [Vec<f64>],
     /// Torque that loads the gears, N m or N: the nominal one, or where it is known better what the plant takes with its effects.
     pub load: &'a [Vec<f64>],
+    /// Torque that the motion takes of the robot with all that was found of it, N m or N; the nominal one before that. A law
+    /// that acts on the effort is told by it and not by the measured effort, whose noise would explain itself.
+    pub taken: &'a [Vec<f64>],
     /// Standard deviation of the noise of each joint's effort, sample by sample, N m or N; empty where it has none.
     pub effort_noise: &'a [f64],
     /// What `tau` was made from; `None` where it is the effort itself.

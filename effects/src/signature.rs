@@ -122,11 +122,9 @@ impl Candidate {
             all.extend((0..model.dof()).map(|j| Candidate::new(kind, vec![j])));
         }
         let is_leaf = |j: &usize| model.joints().iter().all(|child| child.parent != Some(*j));
-        // A leaf's own error and a payload on it are the same ten numbers: told as a payload, by prior.
-        all.extend(
-            (0..model.dof())
-                .map(|j| Candidate::new(if is_leaf(&j) { Kind::Payload } else { Kind::LinkInertiaError }, vec![j])),
-        );
+        // A leaf's own error and a payload on it are the same ten numbers: what is plausible tells them apart.
+        all.extend((0..model.dof()).filter(is_leaf).map(|j| Candidate::new(Kind::Payload, vec![j])));
+        all.extend((0..model.dof()).map(|j| Candidate::new(Kind::LinkInertiaError, vec![j])));
         all.push(Candidate::new(Kind::GravityMisalignment, vec![]));
         for (b, joint) in model.joints().iter().enumerate() {
             let Some(a) = joint.parent else { continue };
@@ -183,6 +181,17 @@ impl Candidate {
         matches!(self.kind, Kind::JointElasticity | Kind::Backlash)
     }
 
+    /// Whether the law filters what was measured, so that its noise comes out larger or smaller.
+    pub fn filters(&self) -> bool {
+        let effort = [Kind::TorqueGainError, Kind::ActuationDelay, Kind::ActuatorLag];
+        self.turns() || effort.contains(&self.kind)
+    }
+
+    /// Whether it hits stops: noise of the motion comes back as blows, early or late.
+    pub fn blows(&self) -> bool {
+        self.kind == Kind::Backlash
+    }
+
     /// Ripples of one joint on a grid of cycles, fine enough that none falls between.
     pub fn ripples(joint: usize, range: &Range) -> Vec<Candidate> {
         let turn = TAU / range.span;
@@ -192,6 +201,24 @@ impl Candidate {
             .filter(|cycles| cycles.is_finite())
             .map(|shape| Candidate { shape, ..Candidate::new(Kind::TorqueRipple, vec![joint]) })
             .collect()
+    }
+
+    /// Whether the signature reads the torque that loads the gears or that the motion takes.
+    pub fn reads_torque(&self) -> bool {
+        matches!(
+            self.kind,
+            Kind::LoadDependentFriction | Kind::TorqueGainError | Kind::ActuationDelay | Kind::ActuatorLag
+        )
+    }
+
+    /// Whether the law is the same law where one of its coefficients is nothing: a coupling may have friction without inertia.
+    pub fn has_optional_parts(&self) -> bool {
+        self.kind == Kind::JointCoupling
+    }
+
+    /// The link whose ten inertial parameters the coefficients add to.
+    pub fn link(&self) -> Option<usize> {
+        matches!(self.kind, Kind::Payload | Kind::LinkInertiaError).then(|| self.joints.first().copied()).flatten()
     }
 
     /// Whether the knob is a number that the logs can tell, rather than a choice or nothing.
@@ -244,7 +271,7 @@ impl Candidate {
             (Kind::GravityMisalignment, _) => gravity_misalignment::signature(motion),
             (Kind::ExternalContact, &[j]) => external_contact::signature(motion, j),
             (Kind::ActuationDelay, _) => actuation_delay::signature(motion, self.shape),
-            (Kind::ActuatorLag, _) => actuator_lag::signature(motion, self.shape),
+            (Kind::ActuatorLag, _) => actuator_lag::signature(motion),
             (Kind::LinkDrag, &[j]) => outside::link_drag(motion, j),
             (Kind::JointDrag, &[j]) => outside::joint_drag(motion, j, self.shape),
             (Kind::Swing, &[j]) => outside::swing(motion, j, self.shape),
@@ -260,6 +287,10 @@ impl Candidate {
         match (self.kind, self.joints.as_slice()) {
             (Kind::Payload, _) => Some(payload::scales(model)),
             (Kind::LinkInertiaError, &[j]) => Some(link_inertia_error::scales(model, j)),
+            (Kind::TorqueGainError, _) => Some(vec![0.15]),
+            (Kind::GravityMisalignment, _) => Some(vec![0.05 * 9.81; 2]),
+            (Kind::JointZeroOffset, _) => Some(vec![0.05]),
+            (Kind::ActuationDelay | Kind::ActuatorLag, _) => Some(vec![0.01]),
             _ => None,
         }
     }

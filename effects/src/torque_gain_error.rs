@@ -48,5 +48,5 @@ const COEFFICIENT: (f64, f64) = (-0.5, 1.0);
 ///
 /// Not the logged effort with coefficient 1 − gain: a gain near zero would then explain everything by nothing.
 pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
-    vec![Column { at_most: COEFFICIENT.1, ..Column::on(joint, motion.nominal[joint].clone(), COEFFICIENT.0) }]
+    vec![Column { at_most: COEFFICIENT.1, ..Column::on(joint, motion.taken[joint].clone(), COEFFICIENT.0) }]
 }

@@ -95,6 +95,9 @@ pub struct Diagnose {
     /// Replace results that are in the folder already
     #[arg(long)]
     pub force: bool,
+    /// Print what was proposed, against what, and by how much the logs spoke for or against it
+    #[arg(long)]
+    pub why: bool,
 }
 
 /// Arguments of `evaluate`.

@@ -25,7 +25,11 @@ pub fn run(args: &Diagnose) -> Result<String> {
     outcome.evidence.logs = args.input.logs.iter().map(|l| l.display().to_string()).collect();
     write(&outcome, &out)?;
     let color = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    Ok(summary::summary(&outcome.diagnosis, Some(&out.join("report.html")), color))
+    let mut text = summary::summary(&outcome.diagnosis, Some(&out.join("report.html")), color);
+    if args.why {
+        text += &summary::why(&outcome.diagnosis);
+    }
+    Ok(text)
 }
 
 /// Diagnoses what is loaded, with progress on the terminal.

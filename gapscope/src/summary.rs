@@ -9,7 +9,9 @@ use crate::report::{
     regime, said_of, significant, span, verdict, with_unit, words_of_the_rest,
 };
 use change::{Cells, change_sign};
-use gapscope_diagnosis::schema::{Diagnosis, Estimate, Evaluation, FoundEffect, Parameter, Regime, Shrink, Verdict};
+use gapscope_diagnosis::schema::{
+    Diagnosis, Estimate, Evaluation, FoundEffect, Parameter, Regime, Shrink, Verdict, Why,
+};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -56,6 +58,23 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, color: bool) -> String
         text += &format!("{} {}\n", paint.head(&pad("Report", INDENT - 1)), out.display());
     }
     text
+}
+
+/// What was proposed, against what, and by how much the logs spoke for it or against it: one line a comparison.
+pub fn why(diagnosis: &Diagnosis) -> String {
+    let mut lines = vec![
+        String::new(),
+        "Why      what was proposed, against what, and by how many nats it won (+) or lost (-);".to_owned(),
+        "         3 nats are odds of twenty to one".to_owned(),
+    ];
+    let mut all: Vec<&Why> = diagnosis.why.iter().collect();
+    all.sort_by(|a, b| b.taken.cmp(&a.taken).then(b.odds.total_cmp(&a.odds)));
+    for Why { proposed, joints, against, odds, taken } in all {
+        let word = if *taken { "taken" } else { "no" };
+        let place = if joints.is_empty() { String::new() } else { format!(" at {}", joints.join(", ")) };
+        lines.push(format!("  {word:5}  {odds:+9.1}  {proposed}{place}, against {against}"));
+    }
+    lines.iter().map(|line| format!("{line}\n")).collect()
 }
 
 /// The evaluation in a few lines: the gap over all logs, before and after, then log by log.

@@ -4,13 +4,11 @@
 //! was found: what that makes of the torque beyond noise and another rotor is what a rigid drive would have left, and is
 //! held against the bar of the search itself.
 
-use super::choice::{BETTER, HALF, IN_NOISE, OF_JOINT};
-use super::{FILTERED, NOTHING, Rigid, SOFTEST, STIFFEST, Study, beyond_doubt, dot, mean, tells};
+use super::choice::MORE_THAN_NOISE;
+use super::{FILTERED, Rigid, SOFTEST, STIFFEST, Study, beyond_doubt, dot, mean, tells};
 use crate::diagnose::Logs;
 use crate::estimate::Fit;
-use crate::gap;
 use crate::problem::Problem;
-use crate::verdict::Level;
 use gapscope_effects::{Candidate, EffectError, EncoderSide, JointRun, Kind};
 use rayon::prelude::*;
 
@@ -46,13 +44,12 @@ impl Logs<'_> {
         };
         let others = Fit { set: fit.set.iter().copied().filter(rigid).collect(), ..fit.clone() };
         let runs = self.joint_runs(problem, &others)?;
-        let weights = gap::weights_of_concern(self.model, &self.signals, &self.moving);
         let of_joint = |j: usize| {
             let mut study = self.moving[j].then(|| Study::new(self, &runs, j, false));
             let mut least = |kind, through| {
                 let study = study.as_mut()?;
                 study.through = through;
-                study.least(kind, side, weights[j], noise[j])
+                study.least(kind, side, noise[j])
             };
             let play = least(Kind::Backlash, false);
             // As they are, and through a filter: the stiffer of the two is the less.
@@ -71,7 +68,7 @@ impl Logs<'_> {
 impl Study<'_> {
     /// The first of ever softer springs, or ever wider gaps, that the search would have told from a rigid drive; nothing
     /// where no rotor shows, without which neither does anything to the torque.
-    fn least(&self, kind: Kind, side: EncoderSide, weight: f64, floor: f64) -> Option<(Candidate, f64)> {
+    fn least(&self, kind: Kind, side: EncoderSide, floor: f64) -> Option<(Candidate, f64)> {
         let rotor = self.rotor;
         if !self.shows(rotor) || (self.through && (kind, side) != FILTERED) {
             return None;
@@ -83,12 +80,12 @@ impl Study<'_> {
         let knobs =
             (0..).map(|i| first * by.powi(i)).take_while(|knob| if by > 1.0 { *knob <= last } else { *knob >= last });
         let at = |shape| Candidate { shape, side, inertia: self.inertia, ..Candidate::new(kind, vec![self.joint]) };
-        let found = knobs.map(at).find(|drive| self.would_show(drive, rotor, weight, floor));
+        let found = knobs.map(at).find(|drive| self.would_show(drive, rotor, floor));
         found.map(|drive| (drive, rotor))
     }
 
     /// Whether the search would have told a drive from a rigid one.
-    fn would_show(&self, drive: &Candidate, rotor: f64, weight: f64, floor: f64) -> bool {
+    fn would_show(&self, drive: &Candidate, rotor: f64, floor: f64) -> bool {
         let rigid = self.against(drive, rotor);
         let hidden = self.hidden(drive, rotor, &rigid);
         let with = vec![rigid.nothing; hidden.len()];
@@ -97,21 +94,11 @@ impl Study<'_> {
         if !tells(&without, &without.left) {
             return false;
         }
-        let Some(beyond) = beyond_doubt(&without, &with) else { return false };
-        let floor = floor * (mean(&without.noise) / mean(&self.rigid.noise).max(f64::MIN_POSITIVE)).sqrt();
-        let level = |hidden: f64| weight * hidden.sqrt().hypot(floor);
-        let typical = |hidden: &[f64]| {
-            mean(&hidden.iter().map(|hidden| level(*hidden).hypot(NOTHING).ln()).collect::<Vec<_>>()).exp()
-        };
-        let (rest, floor) = (level(mean(&hidden)), level(0.0));
-        let (without, with) = (typical(&hidden), typical(&vec![0.0; hidden.len()]));
-        let more_than_noise = Level { before: rest, after: rest, floor }.leaves_any();
-        match (more_than_noise, self.through) {
-            (true, false) => with < BETTER * without,
-            (true, true) => floor < HALF * rest,
-            (false, false) => beyond >= IN_NOISE && with < OF_JOINT * without,
-            (false, true) => false,
+        if beyond_doubt(&without, &with).is_none() {
+            return false;
         }
+        let floor = floor * (mean(&without.noise) / mean(&self.rigid.noise).max(f64::MIN_POSITIVE)).sqrt();
+        mean(&hidden).sqrt().hypot(floor) > MORE_THAN_NOISE * floor
     }
 
     /// Mean square of each block that a rigid drive with the best rotor would leave of a drive, beyond noise, (N m)².

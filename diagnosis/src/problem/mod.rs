@@ -1,19 +1,20 @@
 //! The least-squares problem behind the choice of effects, kept as normal equations per block, so that any subset of
 //! candidates is fitted, held out and resampled in microseconds.
 
+mod embody;
+mod score;
 mod solve;
 mod terms;
 mod weigh;
 
 use crate::band::Band;
-use crate::kernel::{Kernel, apply};
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
-use gapscope_effects::{Candidate, Column, EncoderSide, Kind};
+use gapscope_effects::{Body, Candidate, Column, EncoderSide, Kind};
 use rayon::prelude::*;
-use solve::Normal;
+pub use score::{Score, Solved};
+use solve::{JointNormal, Normal};
 pub use terms::{Entry, Term};
-pub use weigh::OF_NOISE;
 
 /// Rows of one joint: filtered columns and target.
 #[derive(Debug, Clone)]
@@ -38,25 +39,26 @@ pub struct Problem {
     pub entries: Vec<Entry>,
     /// Least and greatest value of each coefficient.
     pub bounds: Vec<(f64, f64)>,
+    /// Kinds that no climb brings in.
+    pub closed: Vec<Kind>,
     /// Precision that each coefficient has before any log is seen, 1 over the square of its unit: 0 where any size is plausible.
     prior: Vec<f64>,
     /// Time between two samples of the fastest log, s.
     pub sample: f64,
     /// Typical effort of each joint, N m or N.
     pub scale: Vec<f64>,
-    /// Noise floor of each joint, N m or N.
-    pub noise: Vec<f64>,
     /// Standard deviation of what the weighing set does not explain, N m or N, with the immaterial part as its least value.
     pub sigma: Vec<f64>,
-    /// Least root mean square torque by which an effect must move a joint to be named on its account, N m or N.
-    pub least: Vec<f64>,
     /// Root mean square of what all effects together are to explain of each joint, N m or N.
     pub gap: Vec<f64>,
     /// Rows of each joint that count as one independent row.
     correlation: Vec<f64>,
+    /// What keeps each link a body.
+    bodies: Vec<Option<Body>>,
     joints: Vec<JointRows>,
     fold_of_block: Vec<usize>,
     folds: usize,
+    normals: Vec<JointNormal>,
     blocks: Vec<Normal>,
     training: Vec<Normal>,
     /// Of the rows of each fold.
@@ -65,8 +67,8 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Sets up the problem: signatures of every candidate on every episode, filtered. `noise` is the noise floor of each
-    /// joint, N m or N. Before use it must be weighed.
+    /// Sets up the problem: signatures of every candidate on every episode, filtered. Before use it
+    /// must be weighed.
     pub fn new(
         model: &Model,
         signals: &[Signals],
@@ -74,7 +76,6 @@ impl Problem {
         standstill: &[f64],
         moving: &[bool],
         terms: Vec<Term>,
-        noise: &[f64],
     ) -> Problem {
         let n = model.dof();
         let terms: Vec<Term> = terms.into_iter().filter(|t| t.candidate.joints.iter().all(|&j| moving[j])).collect();
@@ -82,7 +83,8 @@ impl Problem {
         let half_sample = 0.5 * sample;
         let mut entries = Vec::new();
         let mut bounds = vec![(-half_sample, half_sample)];
-        let mut prior = vec![0.0];
+        // Anywhere within half a sample, each place alike.
+        let mut prior = vec![3.0 / (half_sample * half_sample)];
         let mut joints: Vec<JointRows> = (0..n)
             .map(|_| JointRows {
                 columns: vec![],
@@ -96,7 +98,7 @@ impl Problem {
         for (e, s) in signals.iter().enumerate() {
             let motion = s.motion(model, standstill);
             let alignment = Column {
-                rows: (0..n).map(|j| (j, s.tau_rate[j].clone())).collect(),
+                rows: (0..n).map(|j| (j, s.taken_rate(j))).collect(),
                 at_least: -half_sample,
                 at_most: half_sample,
             };
@@ -110,7 +112,7 @@ impl Problem {
                     prior.resize(bounds.len(), 0.0);
                     let tangent = term.tangent_at.is_some();
                     let candidate = term.candidate.clone();
-                    entries.push(Entry { candidate, columns: begin..bounds.len(), rank: 0, tangent, held: Vec::new() });
+                    entries.push(Entry { candidate, columns: begin..bounds.len(), tangent, held: Vec::new() });
                 }
                 let all = std::iter::once(&alignment).chain(columns.iter().flatten());
                 for (index, column) in all.enumerate() {
@@ -123,7 +125,7 @@ impl Problem {
                 if !moving[j] {
                     return;
                 }
-                let counts: Vec<bool> = s.v[j].iter().map(|v| v.abs() >= standstill[j]).collect();
+                let counts = s.slides(j, standstill[j]);
                 let residual: Vec<f64> =
                     s.tau[j].iter().zip(&s.nominal[j]).map(|(tau, nominal)| tau - nominal).collect();
                 let target = band.filter_where(e, &counts, &residual);
@@ -161,17 +163,18 @@ impl Problem {
         Problem {
             entries,
             bounds,
+            closed: Vec::new(),
             prior,
             sample,
             scale,
-            noise: noise.to_vec(),
             sigma: vec![1.0; n],
-            least: vec![0.0; n],
             gap: joints.iter().map(JointRows::gap).collect(),
             correlation: vec![1.0; n],
+            bodies: (0..n).map(|j| Body::new(model, j)).collect(),
             joints,
             fold_of_block,
             folds: band.folds,
+            normals: Vec::new(),
             blocks: Vec::new(),
             training: Vec::new(),
             held: Vec::new(),
@@ -185,7 +188,7 @@ impl Problem {
         self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
             let mut bent = vec![0.0; band.rows.len()];
             for (e, s) in signals.iter().enumerate() {
-                let counts: Vec<bool> = s.v[j].iter().map(|v| v.abs() >= standstill[j]).collect();
+                let counts = s.slides(j, standstill[j]);
                 for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts, &curvature[e][j])) {
                     bent[row] = x.unwrap_or(0.0);
                 }
@@ -195,41 +198,6 @@ impl Problem {
             }
         });
         self.accumulate(band);
-    }
-
-    /// The same problem on some of the band's rows, with the same weights.
-    pub fn masked(&self, band: &Band, keep: impl Fn(usize) -> bool) -> Problem {
-        let mut part = self.clone();
-        for joint in &mut part.joints {
-            for (weight, &row) in joint.robust.iter_mut().zip(&joint.rows) {
-                if !keep(row) {
-                    *weight = 0.0;
-                }
-            }
-        }
-        part.accumulate(band);
-        part
-    }
-
-    /// The same problem twice, with the same weights: each row smoothed with its neighbours, and what the row has beyond it.
-    /// A law's torque, smoothed, is the law's on its smoothed signature.
-    pub fn slow_and_fast(&self, band: &Band, kernel: &Kernel) -> [Problem; 2] {
-        [true, false].map(|slow| {
-            let mut part = self.clone();
-            part.joints.par_iter_mut().for_each(|joint| joint.smooth(band, kernel, slow));
-            part.accumulate(band);
-            part
-        })
-    }
-
-    /// Whether a robot could have an entry with these coefficients. A law that wants to be more than its bounds is some
-    /// other law (nothing at all, zero, it can be).
-    pub fn plausible(&self, c: usize, theta: &[f64]) -> bool {
-        let entry = &self.entries[c];
-        theta
-            .iter()
-            .zip(&self.bounds[entry.columns.clone()])
-            .all(|(&theta, &(low, high))| theta < high && (theta > low || low == 0.0))
     }
 
     /// Number of blocks that hold rows.
@@ -281,7 +249,7 @@ impl Problem {
                 let mut values: Vec<Vec<f64>> = vec![vec![0.0; band.rows.len()]; runs[0].len()];
                 let mut touched = false;
                 for (e, columns) in runs.iter().enumerate() {
-                    let counts: Vec<bool> = signals[e].v[j].iter().map(|v| v.abs() >= standstill[j]).collect();
+                    let counts = signals[e].slides(j, standstill[j]);
                     for (values, column) in values.iter_mut().zip(columns) {
                         for (_, x) in column.rows.iter().filter(|(row, _)| *row == j) {
                             touched = true;
@@ -308,70 +276,12 @@ impl Problem {
         }
         self.accumulate(band);
     }
-
-    /// Root mean square of what some columns add to each joint.
-    pub fn contribution(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {
-        self.joints
-            .iter()
-            .map(|rows| {
-                let sum: f64 = rows.predict(columns, theta).iter().map(|x| x * x).sum();
-                (sum / rows.rows.len().max(1) as f64).sqrt()
-            })
-            .collect()
-    }
-
-    /// Root mean square of what an entry adds to its joint where it adds anything, and of what all columns leave there.
-    pub fn where_it_acts(&self, c: usize, columns: &[usize], theta: &[f64]) -> (f64, f64) {
-        let (own, own_theta): (Vec<usize>, Vec<f64>) =
-            columns.iter().zip(theta).filter(|(column, _)| self.entries[c].columns.contains(column)).unzip();
-        let (mut added, mut left, mut count) = (0.0, 0.0, 0.0f64);
-        for &j in &self.entries[c].candidate.joints {
-            let rows =
-                self.joints[j].predict(&own, &own_theta).into_iter().zip(self.joints[j].residual(columns, theta));
-            for (x, rest) in rows.filter(|(x, _)| *x != 0.0) {
-                (added, left, count) = (added + x * x, left + rest * rest, count + 1.0);
-            }
-        }
-        ((added / count.max(1.0)).sqrt(), (left / count.max(1.0)).sqrt())
-    }
-
-    /// What some columns add to one joint, row by row.
-    pub fn predict(&self, joint: usize, columns: &[usize], theta: &[f64]) -> Vec<f64> {
-        self.joints[joint].predict(columns, theta)
-    }
 }
 
 impl JointRows {
     fn gap(&self) -> f64 {
         let sum: f64 = self.linear_target.iter().map(|x| x * x).sum();
         (sum / self.linear_target.len().max(1) as f64).sqrt()
-    }
-
-    /// Each row becomes what a kernel over it and its neighbours makes of it, or what it has beyond that. Rows near a gap or
-    /// an end are nothing after it.
-    fn smooth(&mut self, band: &Band, kernel: &Kernel, slow: bool) {
-        let (m, reach) = (self.columns.len(), kernel.reach);
-        let episode = |i: usize| band.rows[self.rows[i]].episode;
-        let whole = |i: usize| {
-            let (first, last) = (i.checked_sub(reach), i + reach);
-            first.filter(|&first| {
-                last < self.rows.len()
-                    && self.rows[last] - self.rows[first] == 2 * reach
-                    && episode(first) == episode(last)
-            })
-        };
-        let part = |own: f64, smooth: f64| if slow { smooth } else { own - smooth };
-        let (mut values, mut target) = (vec![0.0; self.values.len()], vec![0.0; self.target.len()]);
-        for i in 0..self.rows.len() {
-            let Some(first) = whole(i) else { continue };
-            target[i] = part(self.target[i], apply(&kernel.value, &self.target, first));
-            for c in 0..m {
-                let column = self.values[first * m + c..].iter().step_by(m);
-                let smooth = kernel.value.iter().zip(column).map(|(weight, x)| weight * x).sum();
-                values[i * m + c] = part(self.values[i * m + c], smooth);
-            }
-        }
-        (self.values, self.target) = (values, target);
     }
 
     fn predict(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {

@@ -12,8 +12,6 @@ pub struct Entry {
     pub candidate: Candidate,
     /// Its columns.
     pub columns: Range<usize>,
-    /// How many of its coefficients these logs can tell apart at all.
-    pub rank: usize,
     /// Whether the last column is the tangent of the knob, its coefficient the change of the knob.
     pub tangent: bool,
     /// For Stribeck friction, what it held at rest in each fold, where that was seen.

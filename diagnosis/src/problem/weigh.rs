@@ -1,42 +1,32 @@
 //! What a row counts: by the size and correlation of what a fit leaves, and by how exact laws are.
 
 use super::Problem;
-use super::solve::Normal;
+use super::solve::{JointNormal, Normal};
 use crate::band::Band;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Residuals beyond this many standard deviations get less weight (Huber 1964).
 const HUBER: f64 = 3.0;
 /// No law is exact to better than this part of the torque that it explains.
-const INEXACT: f64 = 0.003;
+pub(super) const INEXACT: f64 = 0.003;
 /// Beyond this multiple of that, the weight falls with the square.
 const FAR: f64 = 2.0;
 /// Errors under this part of a joint's effort are nobody's concern: they are what sampling and integration leave.
 const IMMATERIAL: f64 = 1e-3;
-/// An effect must move some joint by this multiple of the immaterial part of its effort, ...
-const MATERIAL: f64 = 3.0;
-/// ... by this part of the noise, which many rows average out, and by all of what no candidate explains beyond the noise,
-/// which no number of rows averages out: with unknown effects of that size about, a smaller one cannot be named.
-pub const OF_NOISE: f64 = 0.2;
-/// Eigenvalues of a candidate's normal equations below this part of the largest count as zero.
-const RANK_TOLERANCE: f64 = 1e-6;
-
+/// Part of a column's size below which what others leave of it is rounding.
+const ROUNDING: f64 = 1e-9;
 impl Problem {
     /// Weights from what a fit of some entries leaves: size and correlation of each joint's rest, outliers down-weighted.
     ///
     /// Not of all entries: laws that bend, many to a joint, together fit the noise too, and the scale would be rounding.
     pub fn weigh(&mut self, band: &Band, set: &[usize]) {
         self.sigma = self.scale.clone();
+        self.correlation.fill(1.0);
         self.joints.iter_mut().for_each(|rows| rows.robust.fill(1.0));
-        self.accumulate(band);
-        for entry in &mut self.entries {
-            entry.rank = rank(&self.total.gram, &entry.columns);
-        }
         let columns = self.columns(set);
         for _ in 0..5 {
-            let theta = self.solve_unbounded(&columns, &self.total);
+            let theta = self.fit_rows(&columns);
             for (j, rows) in self.joints.iter_mut().enumerate() {
                 let rest = rows.residual(&columns, &theta);
                 if rest.len() < 8 {
@@ -63,16 +53,44 @@ impl Problem {
                 self.sigma[j] = (clipped.iter().map(|r| r * r).sum::<f64>() / free as f64).sqrt().max(least);
                 self.correlation[j] = correlation_time(&clipped);
             }
-            self.accumulate(band);
         }
         self.allow_for_inexact_laws();
-        self.least = (0..self.joints.len())
-            .map(|j| {
-                let misfit = (self.sigma[j].powi(2) - self.noise[j].powi(2)).max(0.0).sqrt();
-                (OF_NOISE * self.noise[j]).max(misfit).max(MATERIAL * IMMATERIAL * self.scale[j])
+        self.accumulate(band);
+    }
+
+    /// Least squares of some columns on the rows as they are weighed.
+    fn fit_rows(&self, columns: &[usize]) -> Vec<f64> {
+        let k = columns.len();
+        let parts: Vec<(Vec<usize>, DMatrix<f64>, DVector<f64>)> = self
+            .joints
+            .par_iter()
+            .enumerate()
+            .map(|(j, rows)| {
+                let (place, at): (Vec<usize>, Vec<usize>) = columns
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(i, c)| rows.columns.binary_search(c).ok().map(|at| (i, at)))
+                    .unzip();
+                let (m, scale) = (rows.columns.len(), self.row_scale(j));
+                let weight: Vec<f64> = rows.robust.iter().map(|w| (w * scale).sqrt()).collect();
+                let x = DMatrix::from_fn(at.len(), weight.len(), |c, r| weight[r] * rows.values[r * m + at[c]]);
+                let y = DVector::from_fn(weight.len(), |r, _| weight[r] * rows.target[r]);
+                (place, &x * x.transpose(), &x * &y)
             })
             .collect();
-        self.accumulate(band);
+        let (mut gram, mut moment) = (DMatrix::zeros(k, k), DVector::zeros(k));
+        for (place, own_gram, own_moment) in &parts {
+            for (a, &i) in place.iter().enumerate() {
+                moment[i] += own_moment[a];
+                for (b, &l) in place.iter().enumerate() {
+                    gram[(l, i)] += own_gram[(b, a)];
+                }
+            }
+        }
+        for i in 0..k {
+            gram[(i, i)] = gram[(i, i)] * (1.0 + ROUNDING) + f64::MIN_POSITIVE.sqrt() + self.prior[columns[i]];
+        }
+        gram.cholesky().map_or_else(|| vec![0.0; k], |factor| factor.solve(&moment).iter().copied().collect())
     }
 
     fn allow_for_inexact_laws(&mut self) {
@@ -90,9 +108,27 @@ impl Problem {
         self.accumulate(band);
     }
 
-    /// Normal equations of every block. Rows are weighted, not whitened: whitening would rest the fit on the fast edges of
-    /// the signals, where simple laws (a friction step) are least true.
-    pub(super) fn accumulate(&mut self, band: &Band) {
+    /// Normal equations of each joint and of all. Rows are weighted, not whitened: whitening would rest the fit on the fast
+    /// edges of the signals, where simple laws (a friction step) are least true.
+    pub(super) fn accumulate(&mut self, _band: &Band) {
+        let p = self.bounds.len();
+        self.normals = self.joints.par_iter().map(JointNormal::new).collect();
+        self.total = Normal::zeros(p);
+        for (j, normal) in self.normals.iter().enumerate() {
+            let scale = self.row_scale(j);
+            self.total.square += scale * normal.square;
+            for (a, &ca) in self.joints[j].columns.iter().enumerate() {
+                self.total.moment[ca] += scale * normal.moment[a];
+                for (b, &cb) in self.joints[j].columns.iter().enumerate() {
+                    self.total.gram[(cb, ca)] += scale * normal.gram[(b, a)];
+                }
+            }
+        }
+        self.blocks.clear();
+    }
+
+    /// Normal equations of every block and fold, for what is held out and for intervals.
+    pub fn split(&mut self, band: &Band) {
         let p = self.bounds.len();
         let joints = &self.joints;
         let blocks: Vec<Normal> = (0..band.blocks)
@@ -137,7 +173,6 @@ impl Problem {
             self.training[last].add(&after);
             after.add(&self.held[last]);
         }
-        self.total = before;
         self.blocks = blocks;
     }
 
@@ -146,21 +181,20 @@ impl Problem {
         1.0 / (self.sigma[joint] * self.sigma[joint] * self.correlation[joint])
     }
 
-    /// Rows that count as independent, all joints together; two at least.
-    pub fn effective_rows(&self) -> f64 {
-        self.joints.iter().zip(&self.correlation).map(|(j, c)| j.rows.len() as f64 / c).sum::<f64>().max(2.0)
+    /// Rows of each joint that count as one.
+    pub fn correlation(&self) -> &[f64] {
+        &self.correlation
     }
-}
 
-/// Directions of a candidate's coefficients along which the torque moves, from its part of the normal equations.
-fn rank(gram: &DMatrix<f64>, columns: &Range<usize>) -> usize {
-    let size: Vec<f64> = columns.clone().map(|c| gram[(c, c)].sqrt()).collect();
-    let scaled = DMatrix::from_fn(size.len(), size.len(), |i, j| {
-        let product = size[i] * size[j];
-        if product > 0.0 { gram[(columns.start + i, columns.start + j)] / product } else { 0.0 }
-    });
-    let values = scaled.symmetric_eigenvalues();
-    values.iter().filter(|v| **v > RANK_TOLERANCE * values.max()).count().max(1)
+    /// Number of rows of a joint.
+    pub fn rows(&self, joint: usize) -> f64 {
+        self.joints[joint].rows.len() as f64
+    }
+
+    /// Least variance of the rows of a joint: what sampling and integration leave, (N m)² or N².
+    pub(super) fn least_noise(&self, joint: usize) -> f64 {
+        (IMMATERIAL * self.scale[joint]).powi(2)
+    }
 }
 
 /// Rows per independent row: 1 + 2 Σ ρ_k over the first lags whose autocorrelation ρ_k is positive.

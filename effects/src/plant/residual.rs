@@ -2,7 +2,7 @@
 
 use super::{Direction, Plant};
 use crate::Motion;
-use crate::filter::{bristle, first_order, late};
+use crate::filter::{bristle, early, first_derivative, first_order, late};
 use crate::motion::mean_size;
 use crate::wind_up::{Coupling, JointRun, Oscillator, WindUp, inertia_about, slope_about};
 
@@ -49,16 +49,38 @@ impl Plant {
     /// play is crossed as the logged effort drives the rotor, drawn to the same. With the motor's logged, the link swings
     /// behind it as its inertia and the joint have it, drawn to what the motor is seen to pass on, and every joint takes the torque
     /// of that motion.
+    ///
+    /// What is left is told at the effort that was logged. Behind a lag, or between two samples, its noise would be smaller
+    /// than it is, and a plant that is late would seem to explain some of it.
     pub fn residuals(&mut self, motion: &Motion) -> Vec<Vec<f64>> {
-        let tau = self.acting(motion);
+        let limited = self.limited(motion);
+        let acting = self.late(&limited, motion.dt);
+        let mut rest = self.residuals_where_it_acts(motion, &acting);
+        let (delay, lag) = (self.actuation.delay, self.actuation.lag);
+        if delay > 0.0 || lag > 0.0 {
+            for ((rest, acting), logged) in rest.iter_mut().zip(&acting).zip(&limited) {
+                let taken: Vec<f64> = acting.iter().zip(&*rest).map(|(acting, rest)| acting - rest).collect();
+                let rate = first_derivative(&taken, motion.dt);
+                let needed: Vec<f64> = taken.iter().zip(rate).map(|(taken, rate)| taken + lag * rate).collect();
+                let needed = early(&needed, delay, motion.dt);
+                rest.iter_mut()
+                    .zip(logged.iter().zip(needed))
+                    .for_each(|(rest, (logged, needed))| *rest = logged - needed);
+            }
+        }
+        rest
+    }
+
+    /// The same where the effort acts, `tau` delayed and lagged.
+    fn residuals_where_it_acts(&mut self, motion: &Motion, tau: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let bristles: Vec<Vec<f64>> =
             self.bristles.iter().map(|b| bristle(&motion.v[b.joint], b.stiffness / b.coulomb, motion.dt)).collect();
-        let mut rest = self.run(motion, &tau, &bristles, &[]);
+        let mut rest = self.run(motion, tau, &bristles, &[]);
         let turns = |plant: &Plant, d: usize| plant.drives[d].rotor > 0.0 || plant.motor_encoders;
         if (0..self.drives.len()).any(|d| turns(self, d)) {
-            let turning = self.turning(motion, &tau, &rest);
+            let turning = self.turning(motion, tau, &rest);
             if self.motor_encoders {
-                rest = self.run(motion, &tau, &bristles, &turning);
+                rest = self.run(motion, tau, &bristles, &turning);
             } else {
                 for drive in &turning {
                     for (rest, acceleration) in rest[drive.joint].iter_mut().zip(&drive.ahead.acceleration) {
@@ -73,24 +95,29 @@ impl Plant {
         rest
     }
 
-    /// Effort that acts in a measured run, limited, delayed and lagged, the gain not yet multiplied with.
-    fn acting(&self, motion: &Motion) -> Vec<Vec<f64>> {
-        let act = |(j, x): (usize, &Vec<f64>)| {
+    /// Effort of a measured run as its limits leave it, the gain not yet multiplied with.
+    fn limited(&self, motion: &Motion) -> Vec<Vec<f64>> {
+        let limit = |(j, x): (usize, &Vec<f64>)| {
             let (gain, bias, limit) = (self.actuation.gain[j], self.actuation.bias[j], self.actuation.limit[j]);
             let mut x = x.clone();
             if limit.is_finite() {
                 x.iter_mut().zip(motion.cut(j, gain, bias, limit)).for_each(|(x, cut)| *x += cut / gain);
             }
-            first_order(&late(&x, self.actuation.delay, motion.dt), self.actuation.lag, motion.dt)
+            x
         };
-        motion.tau.iter().enumerate().map(act).collect()
+        motion.tau.iter().enumerate().map(limit).collect()
+    }
+
+    /// Efforts as they act, delayed and lagged.
+    fn late(&self, efforts: &[Vec<f64>], dt: f64) -> Vec<Vec<f64>> {
+        efforts.iter().map(|x| first_order(&late(x, self.actuation.delay, dt), self.actuation.lag, dt)).collect()
     }
 
     /// Every joint along a measured run, its drive still open: of a plant whose drives are rigid. Efforts, rests and
     /// inertias are over the joint's gain, as the log's effort is.
     pub fn joint_runs(&mut self, motion: &Motion) -> Vec<JointRun> {
-        let tau = self.acting(motion);
-        let rest = self.residuals(motion);
+        let tau = self.late(&self.limited(motion), motion.dt);
+        let rest = self.residuals_where_it_acts(motion, &tau);
         tau.into_iter()
             .zip(rest)
             .enumerate()

@@ -265,8 +265,8 @@ fn coefficients_at_their_bounds_are_effects_that_the_plant_takes() {
 fn a_robot_offers_every_kind_where_it_can_be() {
     for (name, joints) in robots::NAMES.into_iter().zip([7, 6, 2]) {
         let all = Candidate::all(&robot(name));
-        // Eight laws a joint and one of its link or flange, one base, and two signs of a coupling for each pair of neighbours.
-        assert_eq!(all.len(), (8 + 1) * joints + 1 + 2 * (joints - 1), "{name}");
+        // Eight laws a joint and one of its link, one load, one base, and two signs of a coupling for each pair of neighbours.
+        assert_eq!(all.len(), (8 + 1) * joints + 1 + 1 + 2 * (joints - 1), "{name}");
         assert_eq!(
             all.iter().filter(|c| c.kind == Kind::Payload).map(|c| c.joints[0]).collect::<Vec<_>>(),
             [joints - 1]

@@ -37,6 +37,7 @@ pub fn motion<'a>(model: &'a Model, signals: [&'a [Vec<f64>]; 5], dt: f64, stand
         tau,
         nominal,
         load: nominal,
+        taken: nominal,
         effort_noise: &[],
         held: None,
         dt,

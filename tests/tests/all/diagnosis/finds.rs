@@ -48,12 +48,22 @@ alone! {
     bias_on_one_joint_of_seven: "arm7" bias([("joint4", 4.0)]);
     spring_on_one_joint: "arm6" spring("joint3", 15.0, 0.4);
     payload_at_the_flange: "arm6" payload(1.5);
-    missing_mass_at_the_flange: "arm6" Effect::Payload(Payload { joint: "joint6".into(), mass: -0.2, com: [0.0, 0.0, -0.02], inertia: [-1e-5, 0.0, -1e-5, 0.0, 0.0, -1e-5] });
     tilted_base: "arm6" tilt();
     tilted_base_of_seven_joints: "arm7" tilt();
     coupling_on_the_sum_of_two_joints: "arm6" coupling(1.0);
     coupling_on_the_difference_of_two_joints: "arm6" coupling(-1.0);
     a_heavier_link: "arm6" Effect::LinkInertiaError(LinkInertiaError { joint: "joint3".into(), mass_delta: 2.0, first_moment_delta: [-0.5, 0.05, 0.1], inertia_delta: [0.05, 0.0, 0.2, 0.0, 0.0, 0.2] });
+}
+
+/// A load that is missing and a last link that is lighter are the same ten numbers.
+#[test]
+fn missing_mass_at_the_flange() {
+    let inertia = [-1.2e-4, 0.0, -1.2e-4, 0.0, 0.0, -1.6e-4];
+    let load = Payload { joint: "joint6".into(), mass: -0.25, com: [0.0, 0.0, -0.001], inertia };
+    let diagnosis = found(&robot("arm6"), &[Effect::Payload(load)]).diagnosis;
+    let [found] = diagnosis.effects.as_slice() else { panic!("{}", summary(&diagnosis)) };
+    assert!(["payload", "link_inertia_error"].contains(&found.kind.as_str()), "{}", summary(&diagnosis));
+    assert_eq!((diagnosis.verdict, found.joints.as_slice()), (Verdict::Explained, &["joint6".to_owned()][..]));
 }
 
 macro_rules! together {

@@ -1,0 +1,42 @@
+//! A problem for tests.
+
+use crate::band::Band;
+use crate::estimate::Fit;
+use crate::problem::{Problem, Term};
+use crate::refine::Data;
+use crate::signals::{Signals, standstill};
+use gapscope_datasets::{Recipe, generate};
+use gapscope_dynamics::robots;
+use gapscope_effects::{Candidate, Kind};
+
+/// A kind fitted to the first joint of a double pendulum, of logs to which something is done.
+pub(crate) fn fitted(kind: Kind, done: impl Fn(&mut Signals)) -> (Vec<Signals>, Band, Problem, Fit) {
+    let model = robots::model("double_pendulum").unwrap().unwrap().model;
+    let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
+    let signals: Vec<Signals> = (1..4)
+        .map(|seed| {
+            let mut s = Signals::new(&model, &generate(&model, &[], seed, &recipe, "log").unwrap()).unwrap();
+            done(&mut s);
+            s
+        })
+        .collect();
+    let (band, still) = (Band::new(&signals), standstill(&signals, 2));
+    let data = Data {
+        model: &model,
+        signals: &signals,
+        band: &band,
+        standstill: &still,
+        moving: &[true; 2],
+        noise: &[1e-3; 2],
+    };
+    let term = Term { candidate: Candidate::new(kind, vec![0]), tangent_at: None };
+    let mut problem = data.problem(vec![term], &Kind::ALL);
+    problem.split(&band);
+    let fit = Fit::on_all(&problem, &[0]);
+    (signals, band, problem, fit)
+}
+
+/// Torque on the first joint, from its velocity.
+pub(crate) fn torque(law: fn(f64) -> f64) -> impl Fn(&mut Signals) {
+    move |s| s.tau[0].iter_mut().zip(&s.v[0]).for_each(|(tau, v)| *tau += law(*v))
+}

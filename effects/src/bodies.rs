@@ -1,0 +1,252 @@
+//! Links stay bodies, whatever a fit makes of them.
+//!
+//! A mass distribution has a positive definite pseudo-inertia J = [Σ h; hᵀ m], Σ = ½ tr(I) 1 − I the second moments about
+//! the link's origin, h the first (Wensing, Kim, Slotine, IEEE RA-L 3(1) 2018, eq. 8). In units of the nominal link, J_0 = L Lᵀ,
+//! a link that is off by little has L⁻¹ J L⁻ᵀ near one; eigenvalues below a least one are raised to it.
+
+use crate::{Effect, Payload};
+use gapscope_dynamics::{Inertia, Model};
+use glam::{DMat3, DVec3};
+use nalgebra::{Matrix4, SMatrix, SVector};
+
+/// Least eigenvalue of a link's pseudo-inertia in units of the nominal link's.
+const LEAST: f64 = 0.02;
+/// A link without inertia in the URDF is measured by a ball of this part of the robot's mass and this radius, m.
+const BALL: (f64, f64) = (1e-3, 0.03);
+/// Halvings towards the largest part of a payload that leaves its link a body.
+const HALVINGS: usize = 40;
+
+/// Moves link errors and payloads as little as makes a body of every link, and of every link with what it carries.
+pub fn keep_bodies(model: &Model, effects: &mut [Effect]) {
+    for (j, joint) in model.joints().iter().enumerate() {
+        let (nominal, unit) = reference(model, j);
+        // A load that is missing leaves a body; one that is there is a body of its own.
+        let mut link = nominal;
+        for effect in effects.iter_mut() {
+            if let Effect::Payload(payload) = effect
+                && payload.joint == joint.name
+                && payload.mass < 0.0
+            {
+                lighten(payload, &link, &unit);
+                link = link.add(&payload.link_inertia());
+            }
+        }
+        for effect in effects.iter_mut() {
+            if let Effect::LinkInertiaError(error) = effect
+                && error.joint == joint.name
+                && let Some(body) = raised(&link.add(&Inertia::from_parameters(&error.coefficients())), &unit)
+            {
+                let (body, link) = (body.parameters(), link.parameters());
+                let left: [f64; 10] = std::array::from_fn(|i| body[i] - link[i]);
+                error.mass_delta = left[0];
+                error.first_moment_delta = [left[1], left[2], left[3]];
+                error.inertia_delta = [left[4], left[5], left[6], left[7], left[8], left[9]];
+            }
+        }
+    }
+}
+
+/// What keeps a link a body while its ten inertial parameters are fitted: the log-det divergence of its pseudo-inertia from
+/// the nominal one, φ(X) = tr X − ln det(1 + X) with X the change in units of the nominal link (Lee, Wensing, Park, IEEE
+/// T-RO 36(3) 2020, eq. 21). It is nothing where nothing changes, convex, and infinite at the edge of what a body can be,
+/// here where an eigenvalue has come down to the least one.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// What one of each of the ten parameters adds to X.
+    units: [Matrix4<f64>; 10],
+}
+
+/// Value, gradient and curvature of a divergence in ten inertial parameters.
+#[derive(Debug, Clone)]
+pub struct Divergence {
+    /// φ.
+    pub value: f64,
+    /// ∂φ/∂π, in one over kg, kg m and kg m².
+    pub gradient: SVector<f64, 10>,
+    /// ∂²φ/∂π².
+    pub hessian: SMatrix<f64, 10, 10>,
+}
+
+impl Body {
+    /// The link that a joint moves, as the model has it.
+    pub fn new(model: &Model, joint: usize) -> Option<Body> {
+        let (_, unit) = reference(model, joint);
+        let inverse = pseudo(&unit).cholesky()?.l().try_inverse()?;
+        let unit_of = |i: usize| {
+            let mut one = [0.0; 10];
+            one[i] = 1.0 / (1.0 - LEAST);
+            inverse * pseudo(&Inertia::from_parameters(&one)) * inverse.transpose()
+        };
+        Some(Body { units: std::array::from_fn(unit_of) })
+    }
+
+    /// The divergence of the link with ten parameters more, kg, kg m, kg m²; `None` where that is no body.
+    pub fn divergence(&self, more: &[f64; 10]) -> Option<Divergence> {
+        let x: Matrix4<f64> = self.units.iter().zip(more).map(|(unit, more)| unit * *more).sum();
+        let factor = (Matrix4::identity() + x).cholesky()?;
+        let inverse = factor.inverse();
+        let log_det = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        let seen: [Matrix4<f64>; 10] = std::array::from_fn(|i| inverse * self.units[i]);
+        Some(Divergence {
+            value: x.trace() - log_det,
+            gradient: SVector::from_fn(|i, _| self.units[i].trace() - seen[i].trace()),
+            hessian: SMatrix::from_fn(|i, k| (seen[i] * seen[k]).trace()),
+        })
+    }
+}
+
+/// Leaves of a load that is missing the largest part that a link can lack.
+fn lighten(payload: &mut Payload, link: &Inertia, unit: &Inertia) {
+    let whole = payload.clone();
+    let scale = |payload: &mut Payload, part: f64| {
+        payload.mass = part * whole.mass;
+        payload.inertia = whole.inertia.map(|x| part * x);
+    };
+    let fits = |payload: &Payload| raised(&link.add(&payload.link_inertia()), unit).is_none();
+    if fits(payload) {
+        return;
+    }
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let part = 0.5 * (low + high);
+        scale(payload, part);
+        if fits(payload) { low = part } else { high = part }
+    }
+    scale(payload, low);
+}
+
+/// A link of the URDF, and the body whose size is the unit of its errors: itself, or a small ball where it is none.
+fn reference(model: &Model, joint: usize) -> (Inertia, Inertia) {
+    let nominal = model.joints()[joint].inertia;
+    let whole: f64 = model.joints().iter().map(|j| j.inertia.mass).sum();
+    let mass = BALL.0 * whole.max(f64::MIN_POSITIVE);
+    let ball = Inertia::from_com(mass, DVec3::ZERO, 0.4 * mass * BALL.1 * BALL.1 * DMat3::IDENTITY);
+    let solid = pseudo(&nominal).cholesky().is_some();
+    let unit = if solid { nominal } else { nominal.add(&ball) };
+    (nominal, unit)
+}
+
+/// The nearest body with no eigenvalue below the least, in units of another; `None` where it is one already.
+fn raised(inertia: &Inertia, unit: &Inertia) -> Option<Inertia> {
+    let factor = pseudo(unit).cholesky()?.l();
+    let inverse = factor.try_inverse()?;
+    let relative = (inverse * pseudo(inertia) * inverse.transpose()).symmetric_eigen();
+    if relative.eigenvalues.iter().all(|x| *x >= LEAST * (1.0 - 1e-9)) {
+        return None;
+    }
+    let eigenvalues = relative.eigenvalues.map(|x| x.max(LEAST));
+    let body = relative.eigenvectors * Matrix4::from_diagonal(&eigenvalues) * relative.eigenvectors.transpose();
+    Some(from_pseudo(&(factor * body * factor.transpose())))
+}
+
+fn pseudo(inertia: &Inertia) -> Matrix4<f64> {
+    let [m, hx, hy, hz, xx, xy, yy, xz, yz, zz] = inertia.parameters();
+    let half = 0.5 * (xx + yy + zz);
+    Matrix4::new(half - xx, -xy, -xz, hx, -xy, half - yy, -yz, hy, -xz, -yz, half - zz, hz, hx, hy, hz, m)
+}
+
+fn from_pseudo(j: &Matrix4<f64>) -> Inertia {
+    let trace = j[(0, 0)] + j[(1, 1)] + j[(2, 2)];
+    let moments = [trace - j[(0, 0)], -j[(0, 1)], trace - j[(1, 1)], -j[(0, 2)], -j[(1, 2)], trace - j[(2, 2)]];
+    let [xx, xy, yy, xz, yz, zz] = moments;
+    Inertia::from_parameters(&[j[(3, 3)], j[(0, 3)], j[(1, 3)], j[(2, 3)], xx, xy, yy, xz, yz, zz])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{LinkInertiaError, Plant};
+    use gapscope_dynamics::robots;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    /// Every link of the robot with some effects.
+    fn links(model: &Model, effects: &[Effect]) -> Vec<Inertia> {
+        let plant = Plant::new(model, effects, 1e-3).unwrap();
+        plant.model().joints().iter().map(|joint| joint.inertia).collect()
+    }
+
+    #[test]
+    fn whatever_is_found_of_links_and_a_load_they_stay_bodies() {
+        let mut random = Pcg64::seed_from_u64(3);
+        for name in ["arm7", "arm6", "double_pendulum"] {
+            let model = robots::model(name).unwrap().unwrap().model;
+            let last = model.joints().last().unwrap().name.clone();
+            for _ in 0..200 {
+                let mut number = |size: f64| size * (2.0 * random.random::<f64>() - 1.0);
+                let mut effects: Vec<Effect> = model
+                    .joints()
+                    .iter()
+                    .map(|joint| {
+                        let [m, r] = [joint.inertia.mass, 0.1];
+                        Effect::LinkInertiaError(LinkInertiaError {
+                            joint: joint.name.clone(),
+                            mass_delta: number(2.0 * m),
+                            first_moment_delta: [(); 3].map(|()| number(m * r)),
+                            inertia_delta: [(); 6].map(|()| number(m * r * r)),
+                        })
+                    })
+                    .collect();
+                let mass = number(1.0);
+                let load = Payload {
+                    joint: last.clone(),
+                    mass,
+                    com: [0.01, 0.02, 0.1],
+                    inertia: [mass.signum() * 1e-3, 0.0, mass.signum() * 1e-3, 0.0, 0.0, mass.signum() * 1e-3],
+                };
+                if number(1.0) > 0.0 {
+                    effects.pop();
+                }
+                effects.push(Effect::Payload(load));
+                keep_bodies(&model, &mut effects);
+                assert!(links(&model, &effects).iter().all(Inertia::is_physical), "{name}: {effects:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_divergence_is_nothing_at_the_urdf_and_has_the_slopes_that_differences_have() {
+        let model = robots::model("arm7").unwrap().unwrap().model;
+        for j in 0..model.dof() {
+            let body = Body::new(&model, j).unwrap();
+            let start = body.divergence(&[0.0; 10]).unwrap();
+            assert!(start.value.abs() < 1e-12 && start.gradient.norm() < 1e-9);
+            let own = model.joints()[j].inertia.parameters();
+            let heavier = own.map(|p| 0.3 * p);
+            let there = body.divergence(&heavier).unwrap();
+            for i in 0..10 {
+                let step = 1e-5 / body.units[i].norm();
+                let moved = |by: f64| {
+                    let mut more = heavier;
+                    more[i] += by;
+                    body.divergence(&more).unwrap()
+                };
+                let (up, down) = (moved(step), moved(-step));
+                let slope = (up.value - down.value) / (2.0 * step);
+                assert!((slope - there.gradient[i]).abs() < 1e-5 * body.units[i].norm(), "{j} {i}");
+                let bend = (up.gradient - down.gradient) / (2.0 * step);
+                let scale = body.units[i].norm() * there.hessian.diagonal().map(f64::sqrt);
+                assert!((0..10).all(|k| (bend[k] - there.hessian[(i, k)]).abs() < 1e-4 * scale[k]), "{j} {i}");
+            }
+            // A body with next to no mass is one, and one with less is none.
+            assert!(body.divergence(&own.map(|p| -0.9 * p)).is_some());
+            assert!(body.divergence(&own.map(|p| -1.01 * p)).is_none());
+        }
+    }
+
+    #[test]
+    fn what_is_a_body_already_stays_as_it_is() {
+        let model = robots::model("arm7").unwrap().unwrap().model;
+        let joint = model.joints()[2].name.clone();
+        let heavier = LinkInertiaError {
+            joint,
+            mass_delta: 0.1 * model.joints()[2].inertia.mass,
+            first_moment_delta: [0.0; 3],
+            inertia_delta: [0.0; 6],
+        };
+        let mut effects = vec![Effect::LinkInertiaError(heavier)];
+        let before = effects.clone();
+        keep_bodies(&model, &mut effects);
+        assert_eq!(effects, before);
+    }
+}

@@ -21,7 +21,7 @@ const WIDER: f64 = 2.0;
 
 impl Logs<'_> {
     /// The choice with the likelier of delay and lag where it has one of them, and the probability that it is the other.
-    pub(crate) fn delay_or_lag(&self, chosen: Chosen) -> Result<Chosen, EffectError> {
+    pub(crate) fn delay_or_lag(&self, mut chosen: Chosen) -> Result<Chosen, EffectError> {
         let late = |c: &usize| LATE.contains(&chosen.all.entries[*c].candidate.kind);
         let Some(at) = chosen.choice.set.iter().position(late) else { return Ok(chosen) };
         let law = &chosen.exact.entries[at].candidate;
@@ -38,10 +38,8 @@ impl Logs<'_> {
         let rests = [at_rows(data.rest(&chosen.exact, &chosen.fit)?), at_rows(data.rest(&exact, &fit)?)];
         let doubt = self.speaks_for_the_second([law, &exact.entries[at].candidate], &rests);
         // What was decided here no climb turns round.
-        let mut chosen = chosen;
         let lost = if doubt <= 0.5 { other } else { chosen.choice.set[at] };
-        let closed = vec![chosen.all.entries[lost].candidate.kind];
-        chosen.all.closed = closed;
+        chosen.all.closed = vec![chosen.all.entries[lost].candidate.kind];
         if doubt <= 0.5 {
             return Ok(Chosen { late_doubt: Some(doubt), ..chosen });
         }

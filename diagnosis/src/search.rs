@@ -6,7 +6,7 @@ use crate::diagnose::{Logs, Progress};
 use crate::estimate::Fit;
 use crate::floor::noise_floor;
 use crate::gap;
-use crate::problem::{Entry, Problem, Term};
+use crate::problem::{AT_REST, Entry, Problem, Term};
 use crate::refine::Data;
 use crate::screen;
 use crate::signals::Signals;
@@ -46,7 +46,7 @@ pub(crate) struct Chosen {
     pub late_doubt: Option<f64>,
     /// Springs and plays that were held against a rigid drive, and by how many nats each won.
     pub tried: Vec<(Candidate, f64)>,
-    /// By how many nats the logs, held against the exact law, speak for each kind beyond calibration.
+    /// By how many nats the logs, held against the exact law, speak for each kind that was held so.
     pub needed: Vec<(Kind, f64)>,
 }
 
@@ -155,7 +155,7 @@ impl Logs<'_> {
         let rest = self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?;
         let bears = |c: usize| {
             let bears = |j: &usize| {
-                let beyond = 3.0 * chosen.exact.sigma[*j];
+                let beyond = AT_REST * chosen.exact.sigma[*j];
                 self.at_rest(*j, &rest).into_iter().flatten().any(|x| x.abs() > beyond)
             };
             of(c).joints.iter().any(bears)
@@ -332,7 +332,7 @@ impl Logs<'_> {
         let data = self.data(&noise);
         let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
         let mut round = 0;
-        loop {
+        let (exact, fit) = loop {
             progress("refining effects", 0.3 + 0.08 * round as f64);
             round += 1;
             let (exact, fit) = data.refine(&with_drive(&all, &choice.set, &turned))?;
@@ -345,17 +345,7 @@ impl Logs<'_> {
                 .map(|(&c, e)| (c, e.candidate.clone()))
                 .collect();
             if round == ROUNDS || choice.set.is_empty() {
-                return Ok(Chosen {
-                    all,
-                    choice,
-                    exact,
-                    fit,
-                    noise,
-                    turned,
-                    late_doubt: None,
-                    tried: Vec::new(),
-                    needed: Vec::new(),
-                });
+                break (exact, fit);
             }
             // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
             let loaded = data.loaded(&exact, &fit)?;
@@ -375,19 +365,11 @@ impl Logs<'_> {
             let same = again.set == choice.set;
             choice = again;
             if same {
-                return Ok(Chosen {
-                    all,
-                    choice,
-                    exact,
-                    fit,
-                    noise,
-                    turned,
-                    late_doubt: None,
-                    tried: Vec::new(),
-                    needed: Vec::new(),
-                });
+                break (exact, fit);
             }
-        }
+        };
+        let (late_doubt, tried, needed) = (None, Vec::new(), Vec::new());
+        Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt, tried, needed })
     }
 }
 

@@ -101,3 +101,28 @@ impl Problem {
         links
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::support::fitted;
+    use gapscope_effects::{Body, Kind};
+
+    /// A torque that takes more away than the link has: least squares alone would leave it lighter than nothing.
+    #[test]
+    fn a_link_stays_a_body_whatever_the_logs_say() {
+        let model = gapscope_dynamics::robots::model("double_pendulum").unwrap().unwrap().model;
+        let body = Body::new(&model, 0).unwrap();
+        let (_, _, problem, fit) = fitted(Kind::LinkInertiaError, |s| {
+            let nominal = s.nominal[0].clone();
+            s.tau[0].iter_mut().zip(nominal).for_each(|(tau, nominal)| *tau -= 3.0 * nominal);
+        });
+        let own = |theta: &[f64]| -> [f64; 10] {
+            let at = problem.entries[0].columns.start;
+            let first = fit.columns.iter().position(|c| *c == at).unwrap();
+            std::array::from_fn(|i| theta[first + i])
+        };
+        assert!(body.divergence(&own(&fit.theta)).is_some(), "{:?}", fit.theta);
+        let free = problem.solve_unbounded(&fit.columns, &problem.total);
+        assert!(body.divergence(&own(&free)).is_none(), "{free:?}");
+    }
+}

@@ -12,7 +12,7 @@ use crate::signals::Signals;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Body, Candidate, Column, EncoderSide, Kind};
 use rayon::prelude::*;
-pub use score::{Score, Solved};
+pub use score::{AT_REST, Score, Solved};
 use solve::{JointNormal, Normal};
 pub use terms::{Entry, Term};
 

@@ -25,7 +25,7 @@ const NOISE_SETTLED: f64 = 0.01;
 const FREEDOM: f64 = 4.0;
 const TAIL_STEPS: usize = 30;
 /// Standard deviations of what a sliding joint leaves up to which what is borne at rest beyond friction is noise.
-const AT_REST: f64 = 3.0;
+pub const AT_REST: f64 = 3.0;
 /// Part of a joint's effort that the gap is taken for, at least, where coefficients are given their spread by it.
 const LEAST_GAP: f64 = 0.01;
 
@@ -407,5 +407,53 @@ impl<'a> Score<'a> {
                 0.5 * theta.dot(&factor.solve(&theta)) + 0.5 * log_det
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two accounts: by how many nats the first is likelier in each of twenty blocks, seen and held out.
+    fn odds(seen: [f64; 20], held_out: [f64; 20], quieter: f64) -> f64 {
+        let account = |seen: &[f64], held_out: &[f64]| Evidence {
+            seen: seen.to_vec(),
+            held_out: held_out.to_vec(),
+            occam: 0.0,
+            noise: Vec::new(),
+        };
+        let (first, second) = (account(&seen, &held_out), account(&[0.0; 20], &[0.0; 20]));
+        let (ahead, behind) = (first.against(&second, quieter), second.against(&first, -quieter));
+        assert!((ahead + behind).abs() < 1e-12, "what speaks for one speaks against the other: {ahead} {behind}");
+        ahead
+    }
+
+    #[test]
+    fn what_one_fit_gains_counts_as_far_as_it_is_gained_held_out_and_blocks_agree() {
+        let all = [2.0; 20];
+        assert!((odds(all, [1.0; 20], 0.0) - 20.0).abs() < 1e-12, "the lesser counts");
+        assert_eq!(odds(all, [-1.0; 20], 0.0), 0.0, "a gain that is lost held out is none");
+        assert!(odds(all, all, 50.0) <= 0.0, "and so is one that noise explains");
+        // The same sum from blocks that vote against each other is a bare majority.
+        let split: [f64; 20] = std::array::from_fn(|i| if i % 2 == 0 { 24.0 } else { -20.0 });
+        let bare = odds(split, split, 0.0);
+        assert!(bare > 0.0 && bare < 2.0, "{bare}");
+        // One block alone may tell, where no other speaks against it.
+        let one: [f64; 20] = std::array::from_fn(|i| if i == 3 { 40.0 } else { 0.0 });
+        assert!((odds(one, one, 0.0) - 40.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_rest_counts_by_what_it_bears_beyond_friction_and_noise() {
+        let at = |borne: f64| {
+            let signals = crate::support::fitted(gapscope_effects::Kind::CoulombFriction, |_| {}).0;
+            let band = Band::new(&signals);
+            let blocks = vec![0.0; band.blocks];
+            let mut evidence = Evidence { seen: blocks.clone(), held_out: blocks, occam: 0.0, noise: Vec::new() };
+            evidence.at_rest(&[vec![Some(borne); band.rows.len()]], &[1.0], &[1.0], &band);
+            evidence.seen.iter().sum::<f64>()
+        };
+        assert_eq!(at(0.9 * AT_REST), 0.0);
+        assert!(at(2.0 * AT_REST) < 0.0 && at(4.0 * AT_REST) < at(2.0 * AT_REST));
     }
 }

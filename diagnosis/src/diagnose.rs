@@ -12,7 +12,7 @@ use crate::gap::{self, Rows};
 use crate::horizon::{self, Errors};
 use crate::learner;
 use crate::power;
-use crate::problem::{Problem, Term};
+use crate::problem::{Known, Problem, Term};
 use crate::refine::Data;
 use crate::regimes::regimes;
 use crate::schema::*;
@@ -97,11 +97,13 @@ pub fn diagnose(
         findings,
     };
     let noisier = noisier(model, episodes, &signals);
-    let mut logs = Logs { model, signals, noisier, band, still, moving };
+    let known = Known::default();
+    let mut logs = Logs { model, signals, noisier, band, still, moving, known };
     if !logs.is_excited() {
         return Ok(logs.not_excited(data));
     }
     progress("signatures of every effect", 0.05);
+    logs.known = Known::new(model, &logs.signals, &logs.band, &logs.still, &logs.moving);
     logs.look_for_pushes()?;
     let chosen = logs.choose(progress)?;
     progress("rivals", 0.55);
@@ -156,6 +158,8 @@ pub(crate) struct Logs<'a> {
     pub band: Band,
     pub still: Vec<f64>,
     pub moving: Vec<bool>,
+    /// Columns that are the same in every problem of these logs.
+    pub known: Known,
 }
 
 /// Held-out residuals and state errors of one model.
@@ -202,6 +206,7 @@ impl Logs<'_> {
             standstill: &self.still,
             moving: &self.moving,
             noise,
+            known: &self.known,
         }
     }
 

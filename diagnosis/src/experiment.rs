@@ -8,7 +8,7 @@ use crate::band::Band;
 use crate::climb::{Choice, Rival, kinds};
 use crate::corrected::plant;
 use crate::estimate::Fit;
-use crate::problem::{Problem, Term};
+use crate::problem::{Known, Problem, Term};
 use crate::refine::Data;
 use crate::schema::{FoundEffect, NextExperiment};
 use crate::signals::{Signals, standstill};
@@ -249,7 +249,7 @@ impl<'a> Pair<'a> {
         let term = |&c: &usize| Term { candidate: self.problem.entries[c].candidate.clone(), tangent_at: None };
         let terms = self.union.iter().map(term).collect();
         let moving = vec![true; data.model.dof()];
-        let mut motion = Problem::new(data.model, &signals, &band, &still, &moving, terms);
+        let mut motion = Problem::new(data.model, &signals, &band, &still, &moving, terms, &Known::default());
         motion.weigh_like(self.problem, &band);
         let there = self.deviance(&motion, &self.rival);
         Ok(if there > 1.0 { there } else { self.deviance(&motion, &self.chosen) }.sqrt())

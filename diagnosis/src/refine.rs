@@ -4,7 +4,7 @@
 use crate::band::Band;
 use crate::corrected::{plant_pushed, residual};
 use crate::estimate::Fit;
-use crate::problem::{Problem, Term};
+use crate::problem::{Known, Problem, Term};
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, Effect, EffectError, Kind, Motion, Plant};
@@ -46,12 +46,23 @@ pub struct Data<'a> {
     pub moving: &'a [bool],
     /// Noise floor of each joint.
     pub noise: &'a [f64],
+    /// Columns that are the same in every problem of these logs.
+    pub known: &'a Known,
+}
+
+/// What the effects of a fit change of the residual, and the coefficients of the columns that stand for it.
+pub struct Bend {
+    /// `[episode][joint][signal]`, N m or N.
+    change: Vec<Vec<Vec<f64>>>,
+    /// Of each entry of the fit's problem; none for a law outside the catalogue.
+    theta: Vec<Vec<f64>>,
 }
 
 impl Data<'_> {
     /// A problem of some terms, weighed by what all those of some kinds leave.
     pub fn problem(&self, terms: Vec<Term>, weighed_by: &[Kind]) -> Problem {
-        let mut problem = Problem::new(self.model, self.signals, self.band, self.standstill, self.moving, terms);
+        let mut problem =
+            Problem::new(self.model, self.signals, self.band, self.standstill, self.moving, terms, self.known);
         let weighs = |c: &usize| weighed_by.contains(&problem.entries[*c].candidate.kind);
         let set: Vec<usize> = (0..problem.entries.len()).filter(weighs).collect();
         problem.weigh(self.band, &set);
@@ -73,36 +84,38 @@ impl Data<'_> {
             .collect()
     }
 
-    /// What the effects of a fit add to the residual beyond their linear signature: `[episode][joint][signal]`.
+    /// What the effects of a fit change of the residual of every run, knobs where they stand.
     ///
     /// # Errors
     /// An effect that the robot cannot have.
-    pub fn curvature(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
+    pub fn bend(&self, problem: &Problem, fit: &Fit) -> Result<Bend, EffectError> {
         let effects = fit.effects(problem, self.model);
         let side = problem.side(&fit.set);
-        self.signals
-            .par_iter()
-            .map(|s| {
-                let mut with = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
-                let mut exact = residual(&mut with, self.model, s, self.standstill, 0.0);
-                let mut nominal = Plant::nominal(self.model, s.dt);
-                let nominal = residual(&mut nominal, self.model, s, self.standstill, 0.0);
-                let motion = s.motion(self.model, self.standstill);
-                // exact = nominal − Σ θφ + curvature
-                for (x, n) in exact.iter_mut().zip(&nominal) {
-                    x.iter_mut().zip(n).for_each(|(x, n)| *x -= n);
-                }
-                for &c in fit.set.iter().filter(|&&c| !problem.entries[c].candidate.kind.is_outside()) {
-                    let (_, theta) = fit.own(problem, c);
-                    for (column, theta) in problem.entries[c].candidate.columns(&motion).iter().zip(theta) {
-                        for (j, torque) in &column.rows {
-                            exact[*j].iter_mut().zip(torque).for_each(|(x, t)| *x += theta * t);
-                        }
-                    }
-                }
-                Ok(exact)
-            })
-            .collect()
+        let change = |s: &Signals| -> Result<Vec<Vec<f64>>, EffectError> {
+            let mut with = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
+            let mut exact = residual(&mut with, self.model, s, self.standstill, 0.0);
+            let nominal = residual(&mut Plant::nominal(self.model, s.dt), self.model, s, self.standstill, 0.0);
+            for (x, n) in exact.iter_mut().zip(&nominal) {
+                x.iter_mut().zip(n).for_each(|(x, n)| *x -= n);
+            }
+            Ok(exact)
+        };
+        let of_catalogue = |c: &usize| !problem.entries[*c].candidate.kind.is_outside();
+        let mut theta = vec![Vec::new(); problem.entries.len()];
+        for c in fit.set.iter().copied().filter(of_catalogue) {
+            theta[c] = fit.own(problem, c).1;
+            theta[c].truncate(problem.entries[c].columns.len() - usize::from(problem.entries[c].tangent));
+        }
+        Ok(Bend { change: self.signals.par_iter().map(change).collect::<Result<_, _>>()?, theta })
+    }
+
+    /// Bends a problem by what was found, `places` telling where its entries stand in that problem.
+    pub fn bent(&self, problem: &mut Problem, places: &[usize], bend: &Bend) {
+        let own = |(&c, theta): (&usize, &Vec<f64>)| {
+            problem.entries[c].columns.clone().zip(theta.clone()).collect::<Vec<_>>()
+        };
+        let signature: Vec<(usize, f64)> = places.iter().zip(&bend.theta).flat_map(own).collect();
+        problem.bend(self.signals, self.band, self.standstill, &bend.change, &signature);
     }
 
     /// The signals, their gears loaded by the torque that the plant takes with all that a fit has. The torque is predicted
@@ -146,7 +159,7 @@ impl Data<'_> {
     pub fn refine(&self, candidates: &[Candidate]) -> Result<(Problem, Fit), EffectError> {
         let mut terms: Vec<Term> = candidates.iter().map(|c| Term { candidate: c.clone(), tangent_at: None }).collect();
         let set: Vec<usize> = (0..terms.len()).collect();
-        let mut curvature: Option<Vec<Vec<Vec<f64>>>> = None;
+        let mut found: Option<Bend> = None;
         let bends = candidates.iter().any(|c| BENT.contains(&c.kind));
         let least = if bends { ROUNDS_FOR_BENT } else { 1 };
         let loads = candidates.iter().any(Candidate::reads_torque);
@@ -155,8 +168,8 @@ impl Data<'_> {
         loop {
             let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
             let mut problem = data.problem(terms.clone(), &Kind::ALL);
-            if let Some(curvature) = &curvature {
-                problem.bend(data.signals, self.band, self.standstill, curvature);
+            if let Some(found) = &found {
+                data.bent(&mut problem, &set, found);
             }
             let fit = Fit::on_all(&problem, &set);
             let mut change = 0.0f64;
@@ -191,8 +204,8 @@ impl Data<'_> {
                 // Curvature belongs to the knobs as they will be.
                 problem =
                     data.problem(terms.iter().map(|t| Term { tangent_at: None, ..t.clone() }).collect(), &Kind::ALL);
-                if let Some(curvature) = &curvature {
-                    problem.bend(data.signals, self.band, self.standstill, curvature);
+                if let Some(found) = &found {
+                    data.bent(&mut problem, &set, found);
                 }
                 at = Fit::on_all(&problem, &set);
             }
@@ -200,7 +213,7 @@ impl Data<'_> {
                 loaded = Some(self.loaded(&problem, &at)?);
             }
             let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
-            curvature = Some(data.curvature(&problem, &at)?);
+            found = Some(data.bend(&problem, &at)?);
             round += 1;
         }
     }

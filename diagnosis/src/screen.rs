@@ -163,6 +163,7 @@ mod tests {
             standstill: &still,
             moving: &[true; 6],
             noise: &[1e-3; 6],
+            known: &crate::problem::Known::default(),
         };
         let nominal = |s: &Signals| residual(&mut Plant::nominal(&model, s.dt), &model, s, &still, 0.0);
         let residuals: Vec<_> = signals.iter().map(nominal).collect();

@@ -359,8 +359,8 @@ impl Logs<'_> {
             let plain = data.problem(exact.entries.iter().map(|e| open(&e.candidate)).collect(), &Kind::ALL);
             let mut plain_fit = Fit::on_all(&plain, &at);
             carry(&fit, &exact, &plain, &mut plain_fit);
-            let curvature = data.curvature(&plain, &plain_fit)?;
-            all.bend(&self.signals, &self.band, &self.still, &curvature);
+            let found = data.bend(&plain, &plain_fit)?;
+            data.bent(&mut all, &choice.set, &found);
             let again = climb::choose(&mut all, &self.band, &choice.set);
             let same = again.set == choice.set;
             choice = again;

@@ -28,6 +28,7 @@ pub(crate) fn fitted(kind: Kind, done: impl Fn(&mut Signals)) -> (Vec<Signals>, 
         standstill: &still,
         moving: &[true; 2],
         noise: &[1e-3; 2],
+        known: &crate::problem::Known::default(),
     };
     let term = Term { candidate: Candidate::new(kind, vec![0]), tangent_at: None };
     let mut problem = data.problem(vec![term], &Kind::ALL);

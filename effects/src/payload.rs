@@ -75,9 +75,12 @@ pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     let mut data = Data::new(motion.model);
     let mut regressor = DMatrix::zeros(n, 10 * n);
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    // A body loads the joints between it and the base.
+    let mut bearing: Vec<usize> = std::iter::successors(Some(joint), |&j| motion.model.joints()[j].parent).collect();
+    bearing.reverse();
     let mut columns: Vec<Column> = (0..10)
         .map(|i| Column {
-            rows: (0..n).map(|j| (j, Vec::with_capacity(motion.len()))).collect(),
+            rows: bearing.iter().map(|&j| (j, Vec::with_capacity(motion.len()))).collect(),
             // A body may be missing, but not more than the link has.
             at_least: if i == 0 { -motion.model.joints()[joint].inertia.mass } else { f64::NEG_INFINITY },
             at_most: f64::INFINITY,

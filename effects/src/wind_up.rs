@@ -207,10 +207,11 @@ impl Oscillator<'_> {
             let next = drive.get(k + 1).copied().unwrap_or(now);
             let seen = seen.map(|s| (s[k], s.get(k + 1).copied().unwrap_or(s[k])));
             let pull = -(-h * coupling.pull(inertia)).exp_m1();
+            let per_torque = h / inertia;
             for i in 0..steps as usize {
                 let part = (i as f64 + 0.5) / steps;
                 let drive = now + (next - now) * part;
-                rate += h * (drive - slope * angle - coupling.torque(angle, rate)) / inertia;
+                rate += per_torque * (drive - slope * angle - coupling.torque(angle, rate));
                 angle += h * rate;
                 if let Some((now, next)) = seen {
                     angle += pull * (coupling.held_by(now + (next - now) * part, angle) - angle);

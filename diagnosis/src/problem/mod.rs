@@ -2,6 +2,8 @@
 //! candidates is fitted, held out and resampled in microseconds.
 
 mod embody;
+mod factor;
+mod known;
 mod score;
 mod solve;
 mod terms;
@@ -11,9 +13,11 @@ use crate::band::Band;
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Body, Candidate, Column, EncoderSide, Kind};
+pub use known::Known;
 use rayon::prelude::*;
 pub use score::{AT_REST, Score, Solved};
 use solve::{JointNormal, Normal};
+use std::borrow::Cow;
 pub use terms::{Entry, Term};
 
 /// Rows of one joint: filtered columns and target.
@@ -67,8 +71,8 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Sets up the problem: signatures of every candidate on every episode, filtered. Before use it
-    /// must be weighed.
+    /// Sets up the problem: signatures of every candidate on every episode, filtered, those that are known taken as they
+    /// are. Before use it must be weighed.
     pub fn new(
         model: &Model,
         signals: &[Signals],
@@ -76,6 +80,7 @@ impl Problem {
         standstill: &[f64],
         moving: &[bool],
         terms: Vec<Term>,
+        known: &Known,
     ) -> Problem {
         let n = model.dof();
         let terms: Vec<Term> = terms.into_iter().filter(|t| t.candidate.joints.iter().all(|&j| moving[j])).collect();
@@ -102,11 +107,20 @@ impl Problem {
                 at_least: -half_sample,
                 at_most: half_sample,
             };
-            let columns: Vec<Vec<Column>> = terms.par_iter().map(|t| t.columns(&motion)).collect();
+            let fresh: Vec<Option<Vec<Column>>> =
+                terms.par_iter().map(|t| known.of(t).is_none().then(|| t.columns(&motion))).collect();
+            let columns: Vec<Columns<'_>> = terms
+                .iter()
+                .zip(&fresh)
+                .map(|(term, fresh)| match fresh {
+                    Some(columns) => Columns::Samples(columns),
+                    None => Columns::Rows(known.of(term).unwrap_or_default()),
+                })
+                .collect();
             if e == 0 {
                 for (term, columns) in terms.iter().zip(&columns) {
                     let begin = bounds.len();
-                    bounds.extend(columns.iter().map(|c| (c.at_least, c.at_most)));
+                    bounds.extend(columns.list().iter().map(|c| (c.at_least, c.at_most)));
                     let scales = term.candidate.scales(model).unwrap_or_default();
                     prior.extend(scales.iter().map(|scale| scale.powi(-2)));
                     prior.resize(bounds.len(), 0.0);
@@ -114,13 +128,14 @@ impl Problem {
                     let candidate = term.candidate.clone();
                     entries.push(Entry { candidate, columns: begin..bounds.len(), tangent, held: Vec::new() });
                 }
-                let all = std::iter::once(&alignment).chain(columns.iter().flatten());
+                let all = std::iter::once(&alignment).chain(columns.iter().flat_map(Columns::list));
                 for (index, column) in all.enumerate() {
                     for (j, _) in &column.rows {
                         joints[*j].columns.push(index);
                     }
                 }
             }
+            let of_episode = &band.of_episode[e];
             joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
                 if !moving[j] {
                     return;
@@ -129,12 +144,20 @@ impl Problem {
                 let residual: Vec<f64> =
                     s.tau[j].iter().zip(&s.nominal[j]).map(|(tau, nominal)| tau - nominal).collect();
                 let target = band.filter_where(e, &counts, &residual);
-                let filtered: Vec<Vec<Option<f64>>> = std::iter::once(&alignment)
-                    .chain(columns.iter().flatten())
-                    .flat_map(|c| c.rows.iter().filter(|(row, _)| *row == j))
-                    .map(|(_, x)| band.filter_where(e, &counts, x))
+                let at_rows = |x: &[f64]| -> Cow<'_, [f64]> {
+                    band.filter_where(e, &counts, x).into_iter().map(|x| x.unwrap_or(0.0)).collect()
+                };
+                let once = Columns::Samples(std::slice::from_ref(&alignment));
+                let filtered: Vec<Cow<'_, [f64]>> = std::iter::once(&once)
+                    .chain(&columns)
+                    .flat_map(|columns| columns.list().iter().map(move |c| (columns, c)))
+                    .flat_map(|(columns, c)| c.rows.iter().filter(|(row, _)| *row == j).map(move |(_, x)| (columns, x)))
+                    .map(|(columns, x)| match columns {
+                        Columns::Samples(_) => at_rows(x),
+                        Columns::Rows(_) => Cow::Borrowed(&x[of_episode.clone()]),
+                    })
                     .collect();
-                for (i, row) in band.of_episode[e].clone().enumerate() {
+                for (i, row) in of_episode.clone().enumerate() {
                     let Some(target) = target[i] else { continue };
                     if !band.rows[row].fits {
                         continue;
@@ -143,7 +166,7 @@ impl Problem {
                     rows.linear_target.push(target);
                     rows.target.push(target);
                     rows.robust.push(1.0);
-                    rows.values.extend(filtered.iter().map(|x| x[i].unwrap_or(0.0)));
+                    rows.values.extend(filtered.iter().map(|x| x[i]));
                 }
             });
         }
@@ -182,19 +205,29 @@ impl Problem {
         }
     }
 
-    /// Adds to the target what effects that were found add to the residual beyond their linear signature
-    /// (`[episode][joint][signal]`, from the unbent problem), so that fitting again finds them exactly: a chord method.
-    pub fn bend(&mut self, signals: &[Signals], band: &Band, standstill: &[f64], curvature: &[Vec<Vec<f64>>]) {
+    /// Adds to the target what effects that were found change of the residual beyond their linear signature, so that fitting
+    /// again finds them exactly: a chord method. `change` is what they change (`[episode][joint][signal]`), `signature` the
+    /// coefficients of columns of this problem that stand for it.
+    pub fn bend(
+        &mut self,
+        signals: &[Signals],
+        band: &Band,
+        standstill: &[f64],
+        change: &[Vec<Vec<f64>>],
+        signature: &[(usize, f64)],
+    ) {
+        let (columns, theta): (Vec<usize>, Vec<f64>) = signature.iter().copied().unzip();
         self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
             let mut bent = vec![0.0; band.rows.len()];
             for (e, s) in signals.iter().enumerate() {
                 let counts = s.slides(j, standstill[j]);
-                for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts, &curvature[e][j])) {
+                for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts, &change[e][j])) {
                     bent[row] = x.unwrap_or(0.0);
                 }
             }
+            let linear = rows.predict(&columns, &theta);
             for (i, &row) in rows.rows.iter().enumerate() {
-                rows.target[i] = rows.linear_target[i] + bent[row];
+                rows.target[i] = rows.linear_target[i] + bent[row] + linear[i];
             }
         });
         self.accumulate(band);
@@ -275,6 +308,19 @@ impl Problem {
             self.entries[*c].candidate = candidate.clone();
         }
         self.accumulate(band);
+    }
+}
+
+/// Columns of a candidate on one run, sample by sample, or on all runs at the rows of the band.
+enum Columns<'a> {
+    Samples(&'a [Column]),
+    Rows(&'a [Column]),
+}
+
+impl<'a> Columns<'a> {
+    fn list(&self) -> &'a [Column] {
+        let (Columns::Samples(columns) | Columns::Rows(columns)) = self;
+        columns
     }
 }
 

@@ -1,6 +1,7 @@
 //! Fits of any subset of the columns: bounded least squares on normal equations, held out by folds, and their covariance.
 
 use super::Problem;
+use super::factor::Factor;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -104,7 +105,7 @@ impl Problem {
     fn sandwich(&self, columns: &[usize], scores: &[DVector<f64>]) -> DMatrix<f64> {
         let (m, used) = (columns.len(), scores.len());
         let meat = scores.iter().fold(DMatrix::zeros(m, m), |meat, score| meat + score * score.transpose());
-        let bread = self.regular(columns, &self.total).cholesky().map(|c| c.inverse());
+        let bread = Factor::new(&self.regular(columns, &self.total)).map(|c| c.inverse());
         let Some(bread) = bread else { return DMatrix::from_element(m, m, f64::INFINITY) };
         let factor = if used > 1 { used as f64 / (used - 1) as f64 } else { f64::INFINITY };
         let prior = DMatrix::from_diagonal(&DVector::from_fn(m, |i, _| self.prior[columns[i]]));
@@ -122,8 +123,7 @@ impl Problem {
     /// Least squares without bounds.
     pub(super) fn solve_unbounded(&self, columns: &[usize], normal: &Normal) -> Vec<f64> {
         let moment = DVector::from_fn(columns.len(), |i, _| normal.moment[columns[i]]);
-        self.regular(columns, normal)
-            .cholesky()
+        Factor::new(&self.regular(columns, normal))
             .map_or_else(|| vec![0.0; columns.len()], |c| c.solve(&moment).iter().copied().collect())
     }
 
@@ -153,7 +153,7 @@ impl Problem {
                 let fixed: f64 = (0..m).filter_map(|j| held[j].map(|h| gram[(free[a], j)] * h)).sum();
                 moment[free[a]] - fixed
             });
-            let Some(cholesky) = sub.cholesky() else { return vec![0.0; m] };
+            let Some(cholesky) = Factor::new(&sub) else { return vec![0.0; m] };
             let solution = cholesky.solve(&right);
             for i in 0..m {
                 if let Some(value) = held[i] {

@@ -1,6 +1,7 @@
 //! What a row counts: by the size and correlation of what a fit leaves, and by how exact laws are.
 
 use super::Problem;
+use super::factor::Factor;
 use super::solve::{JointNormal, Normal};
 use crate::band::Band;
 use nalgebra::{DMatrix, DVector};
@@ -90,7 +91,7 @@ impl Problem {
         for i in 0..k {
             gram[(i, i)] = gram[(i, i)] * (1.0 + ROUNDING) + f64::MIN_POSITIVE.sqrt() + self.prior[columns[i]];
         }
-        gram.cholesky().map_or_else(|| vec![0.0; k], |factor| factor.solve(&moment).iter().copied().collect())
+        Factor::new(&gram).map_or_else(|| vec![0.0; k], |factor| factor.solve(&moment).iter().copied().collect())
     }
 
     fn allow_for_inexact_laws(&mut self) {

@@ -1,0 +1,61 @@
+//! Filtered columns that every problem of the same logs has alike: those of laws without a knob that read no torque.
+
+use super::Term;
+use crate::band::Band;
+use crate::signals::Signals;
+use gapscope_dynamics::Model;
+use gapscope_effects::{Candidate, Column, Kind};
+use rayon::prelude::*;
+
+/// Candidates whose columns stay, with those columns at the rows of a band.
+#[derive(Debug, Clone, Default)]
+pub struct Known(Vec<(Candidate, Vec<Column>)>);
+
+impl Known {
+    /// The columns of all candidates of a robot that stay as they are whatever else is found in its logs.
+    pub fn new(model: &Model, signals: &[Signals], band: &Band, standstill: &[f64], moving: &[bool]) -> Known {
+        let stays = |c: &Candidate| {
+            // A push is known by when it comes, and that is found later.
+            c.shape == 0.0 && !c.has_knob() && !c.reads_torque() && c.kind != Kind::ExternalContact
+        };
+        let all = Candidate::all(model);
+        let candidates = all.into_iter().filter(|c| stays(c) && c.joints.iter().all(|&j| moving[j]));
+        let candidates: Vec<Candidate> = candidates.collect();
+        Known(
+            candidates
+                .into_par_iter()
+                .map(|c| (at_rows(model, signals, band, standstill, &c), c))
+                .map(|(columns, c)| (c, columns))
+                .collect(),
+        )
+    }
+
+    /// The columns of a term at the rows of the band, where they are known.
+    pub(super) fn of(&self, term: &Term) -> Option<&[Column]> {
+        let same =
+            |(candidate, _): &&(Candidate, Vec<Column>)| *candidate == term.candidate && term.tangent_at.is_none();
+        self.0.iter().find(same).map(|(_, columns)| columns.as_slice())
+    }
+}
+
+/// The columns of a candidate at all rows of a band, 0 at rows at which dry friction sticks.
+fn at_rows(model: &Model, signals: &[Signals], band: &Band, standstill: &[f64], candidate: &Candidate) -> Vec<Column> {
+    let mut all: Vec<Column> = Vec::new();
+    for (e, s) in signals.iter().enumerate() {
+        let columns = candidate.columns(&s.motion(model, standstill));
+        if e == 0 {
+            let empty = |c: &Column| Column {
+                rows: c.rows.iter().map(|(j, _)| (*j, Vec::with_capacity(band.rows.len()))).collect(),
+                ..*c
+            };
+            all = columns.iter().map(empty).collect();
+        }
+        for (all, column) in all.iter_mut().zip(&columns) {
+            for ((_, rows), (j, x)) in all.rows.iter_mut().zip(&column.rows) {
+                let filtered = band.filter_where(e, &s.slides(*j, standstill[*j]), x);
+                rows.extend(filtered.into_iter().map(|x| x.unwrap_or(0.0)));
+            }
+        }
+    }
+    all
+}

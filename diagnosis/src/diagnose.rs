@@ -28,7 +28,7 @@ use std::collections::BTreeMap;
 /// A rival as likely as this is named beside the choice.
 const WORTH_NAMING: f64 = 0.01;
 /// An effect whose best rival is less likely by no more than this cannot be told from it, nats: twenty to one.
-const TIE: f64 = 3.0;
+pub(crate) const TIE: f64 = 3.0;
 /// A joint moves if this part of its samples is in motion, ...
 const MOVING_PART: f64 = 0.05;
 /// ... and its top speed is this many times the speed that counts as standing.
@@ -106,9 +106,7 @@ pub fn diagnose(
     logs.known = Known::new(model, &logs.signals, &logs.band, &logs.still, &logs.moving);
     logs.look_for_pushes()?;
     let chosen = logs.choose(progress)?;
-    progress("rivals", 0.55);
-    let rivals = climb::rivals(&chosen.all, &chosen.choice);
-    logs.conclude(&chosen, &rivals, data, progress)
+    logs.conclude(&chosen, data, progress)
 }
 
 /// Signals of every episode that is long enough.
@@ -321,13 +319,7 @@ impl Logs<'_> {
         gap::at_rows(&self.band, &residuals, self.model.dof())
     }
 
-    fn conclude(
-        &self,
-        chosen: &Chosen,
-        rivals: &[Rival],
-        data: DataSummary,
-        progress: Progress<'_>,
-    ) -> Result<Outcome, EffectError> {
+    fn conclude(&self, chosen: &Chosen, data: DataSummary, progress: Progress<'_>) -> Result<Outcome, EffectError> {
         let model = self.model;
         let weights = gap::weights(&self.signals, &self.moving);
         let (problem, fit) = (&chosen.exact, &chosen.fit);
@@ -379,7 +371,7 @@ impl Logs<'_> {
         let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());
         // What a law outside the catalogue accounts for does not speak against the effects beside it.
         let misfit = (verdict != Verdict::Explained).then_some(&beside);
-        let found = self.found_effects(chosen, rivals, misfit, change)?;
+        let found = self.found_effects(chosen, misfit, change)?;
         let corrected = Corrected {
             schema: MODEL_SCHEMA.to_owned(),
             robot: model.name().to_owned(),
@@ -403,9 +395,14 @@ impl Logs<'_> {
         let left = remaining.regimes.clone();
         evidence.remaining = (!found.is_empty()).then_some(remaining);
         progress("next experiment", 0.95);
-        let (next_experiment, trajectory) =
-            experiment::next_experiment(&self.data(&chosen.noise), &chosen.all, &chosen.choice, rivals, &found)?
-                .unzip();
+        let (next_experiment, trajectory) = experiment::next_experiment(
+            &self.data(&chosen.noise),
+            &chosen.all,
+            &chosen.choice,
+            &chosen.rivals,
+            &found,
+        )?
+        .unzip();
         let drives = self.least_drives(problem, fit, side, &chosen.noise)?;
         let diagnosis = Diagnosis {
             schema: DIAGNOSIS_SCHEMA.to_owned(),
@@ -417,8 +414,8 @@ impl Logs<'_> {
             next_experiment,
             power: power::power(model, &chosen.all, &chosen.choice.set, &drives),
             effects: found,
-            alternatives: alternatives(&chosen.all, rivals),
-            why: self.why(chosen, rivals),
+            alternatives: alternatives(&chosen.all, &chosen.rivals),
+            why: self.why(chosen),
             unexplained: Unexplained {
                 fraction: unexplained,
                 learnable,
@@ -443,7 +440,6 @@ impl Logs<'_> {
     fn found_effects(
         &self,
         chosen: &Chosen,
-        rivals: &[Rival],
         misfit: Option<&Judged>,
         change: impl Fn(&Rows) -> Change,
     ) -> Result<Vec<FoundEffect>, EffectError> {
@@ -457,16 +453,9 @@ impl Logs<'_> {
             let turned = chosen.turned.as_ref().filter(|t| t.drive.kind == kind);
             // The choice sees a drive by its rotor.
             let seen_as = if turned.is_some() { Kind::Armature } else { kind };
-            let rival = rivals.iter().find(|r| r.without == seen_as);
+            let rival = chosen.rivals.iter().find(|r| r.without == seen_as);
             let late = chosen.late_doubt.filter(|_| LATE.contains(&kind));
-            let exact = chosen.needed.iter().find(|(needed, _)| *needed == kind).map(|(_, odds)| *odds);
-            let odds = match turned {
-                Some(turned) => turned.odds,
-                None => exact.or(rival.map(|r| r.odds)).unwrap_or(f64::INFINITY),
-            };
-            // What could be another is no surer than that it is not.
-            let tied = rival.map(|r| r.odds).filter(|odds| turned.is_none() && *odds < TIE);
-            let odds = tied.map_or(odds, |tied| odds.min(tied.max(0.0)));
+            let odds = turned.map(|turned| turned.odds).or(rival.map(|r| r.odds)).unwrap_or(f64::INFINITY);
             let doubt = late.unwrap_or(0.0).max(1.0 / (1.0 + odds.exp()));
             let mut confused = rival
                 .filter(|_| turned.is_none() && late.is_none())
@@ -505,13 +494,14 @@ impl Logs<'_> {
 
     /// The comparisons that decided: each kind found against the best account without it, each spring or play that was tried
     /// against a rigid drive, and each kind that was not found against what was.
-    fn why(&self, chosen: &Chosen, rivals: &[Rival]) -> Vec<Why> {
+    fn why(&self, chosen: &Chosen) -> Vec<Why> {
         let names = |joints: &[usize]| joints.iter().map(|&j| self.model.joints()[j].name.clone()).collect();
         let set = |kinds: Vec<Kind>| -> String {
             let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
             if names.is_empty() { "nothing".into() } else { names.join(" + ") }
         };
-        let mut why: Vec<Why> = rivals
+        let mut why: Vec<Why> = chosen
+            .rivals
             .iter()
             .map(|rival| Why {
                 proposed: rival.without.name().to_owned(),

@@ -314,6 +314,7 @@ fn predicted(
         nominal: &nominal,
         load: &nominal,
         taken: &nominal,
+        drives: &[],
         effort_noise: &[],
         held: None,
         dt,

@@ -145,6 +145,7 @@ impl Data<'_> {
                 Ok(Signals {
                     load: Some(torque(&effects, if crossed { &s.tau } else { &idle })?),
                     taken: Some(torque(&taken, if crossed { &s.tau } else { &idle })?),
+                    drives: plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?.drives(),
                     ..s.clone()
                 })
             })

@@ -56,6 +56,8 @@ pub struct Signals {
     pub load: Option<Vec<Vec<f64>>>,
     /// Torque that the motion takes with what was found, N m or N, where that is known.
     pub taken: Option<Vec<Vec<f64>>>,
+    /// Gain and bias (N m or N) of each joint's drive, where they are known.
+    pub drives: Vec<(f64, f64)>,
     /// Standard deviation of the white noise of each joint's position, rad or m.
     pub position_noise: Vec<f64>,
     /// Standard deviation of the noise of each joint's velocity, rad/s or m/s.
@@ -124,6 +126,7 @@ impl Signals {
             nominal: vec![Vec::with_capacity(length); n],
             load: None,
             taken: None,
+            drives: Vec::new(),
             position_noise,
             velocity_noise,
             effort_noise,
@@ -199,6 +202,7 @@ impl Signals {
             nominal: &self.nominal,
             load: self.load.as_ref().unwrap_or(&self.nominal),
             taken: self.taken.as_ref().unwrap_or(&self.nominal),
+            drives: &self.drives,
             effort_noise: &self.effort_noise,
             held: Some(Held {
                 effort: &self.effort,

@@ -26,6 +26,8 @@ pub struct Motion<'a> {
     /// Torque that the motion takes of the robot with all that was found of it, N m or N; the nominal one before that. A law
     /// that acts on the effort is told by it and not by the measured effort, whose noise would explain itself.
     pub taken: &'a [Vec<f64>],
+    /// Gain and bias (N m or N) of each joint's drive, as far as they were found: limits act behind them. Empty: 1 and 0.
+    pub drives: &'a [(f64, f64)],
     /// Standard deviation of the noise of each joint's effort, sample by sample, N m or N; empty where it has none.
     pub effort_noise: &'a [f64],
     /// What `tau` was made from; `None` where it is the effort itself.

@@ -203,11 +203,16 @@ impl Candidate {
             .collect()
     }
 
-    /// Whether the signature reads the torque that loads the gears or that the motion takes.
+    /// Whether the signature rests on what else was found: the torque that loads the gears or that the motion takes, or the
+    /// gain and bias of a drive.
     pub fn reads_torque(&self) -> bool {
         matches!(
             self.kind,
-            Kind::LoadDependentFriction | Kind::TorqueGainError | Kind::ActuationDelay | Kind::ActuatorLag
+            Kind::LoadDependentFriction
+                | Kind::TorqueGainError
+                | Kind::ActuationDelay
+                | Kind::ActuatorLag
+                | Kind::TorqueSaturation
         )
     }
 

@@ -43,8 +43,9 @@ impl Law for TorqueSaturation {
 /// Where a coefficient of one, which is what a limit has, ends to be plausible.
 const COEFFICIENT: (f64, f64) = (0.8, 1.2);
 
-/// One column at a limit: the effort beyond it. Coefficient: one.
+/// One column at a limit: the effort beyond it, behind the gain and the bias of the drive. Coefficient: one.
 pub(crate) fn signature(motion: &Motion, joint: usize, limit: f64) -> Vec<Column> {
-    let beyond = motion.cut(joint, 1.0, 0.0, limit).iter().map(|x| -x).collect();
+    let (gain, bias) = motion.drives.get(joint).copied().unwrap_or((1.0, 0.0));
+    let beyond = motion.cut(joint, gain, bias, limit).iter().map(|x| -x / gain).collect();
     vec![Column { at_most: COEFFICIENT.1, ..Column::on(joint, beyond, COEFFICIENT.0) }]
 }

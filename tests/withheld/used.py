@@ -34,6 +34,7 @@ COULOMB = ("stribeck_friction", "presliding_friction", "thermal_drift")   # take
 WITHIN_TICK = COULOMB + ("load_dependent_friction", "torque_ripple", "joint_coupling", "joint_elasticity", "backlash", "actuation_delay", "actuator_lag", "external_contact")
 UNKNOWN = bank.UNKNOWN * 2 + ["unknown_oil_drag", "unknown_stiffening_hose"]
 VISIBLE = 8.0
+REACHED = .02    # part of the training samples in which a limit is reached, at least: one that no log reaches cannot be told
 
 
 def body(m, b):
@@ -346,7 +347,8 @@ def make_case(a, i):
             out = go(k)
             if out is None or np.max(np.abs(out[:, 1:1 + n] - out[:, 1 + 3 * n:])) > .6: break
             episodes.append(out)
-        if len(episodes) == a.ntrain + a.ntest: break
+        over = lambda e: np.mean([np.mean(np.abs(o[:, 1 + 2 * n + e["joints"][0]]) > e["limit"]) for o in episodes[:a.ntrain]])
+        if len(episodes) == a.ntrain + a.ntest and all(over(e) >= REACHED for e in last if e["kind"] == "torque_saturation"): break
     else: return f"case_{i:03d} left out: {further} does not hold or show on {robot} at {rate} Hz"
     gap = gap or sight.gap(effects)
     for e in effects:

@@ -214,6 +214,11 @@ impl Plant {
         self
     }
 
+    /// Gain and bias (N m or N) of each joint's drive.
+    pub fn drives(&self) -> Vec<(f64, f64)> {
+        self.actuation.gain.iter().copied().zip(self.actuation.bias.iter().copied()).collect()
+    }
+
     /// The rigid-body model with the inertial effects and the gravity of this plant.
     pub fn model(&self) -> &Model {
         &self.model

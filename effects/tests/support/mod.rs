@@ -38,6 +38,7 @@ pub fn motion<'a>(model: &'a Model, signals: [&'a [Vec<f64>]; 5], dt: f64, stand
         nominal,
         load: nominal,
         taken: nominal,
+        drives: &[],
         effort_noise: &[],
         held: None,
         dt,

@@ -6,6 +6,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod carry;
+mod isaaclab;
 mod ledger;
 mod mjcf;
 mod number;
@@ -30,6 +31,8 @@ pub enum Target {
     Urdf,
     /// MuJoCo's model file.
     Mjcf,
+    /// A configuration for Isaac Lab, which reads the URDF beside it.
+    IsaacLab,
 }
 
 impl Target {
@@ -38,6 +41,7 @@ impl Target {
         match self {
             Target::Urdf => "urdf",
             Target::Mjcf => "mjcf",
+            Target::IsaacLab => "isaaclab",
         }
     }
 
@@ -46,6 +50,7 @@ impl Target {
         match self {
             Target::Urdf => "robot.urdf",
             Target::Mjcf => "robot.xml",
+            Target::IsaacLab => "isaaclab_robot.py",
         }
     }
 }
@@ -81,6 +86,9 @@ pub enum ExportError {
     /// A text that is no XML.
     #[error("the robot description is not well-formed XML ({0}); mend it there")]
     Text(String),
+    /// A link or joint of the model that the text does not have under its name.
+    #[error("the robot description has no <{0}> named `{1}` to correct; give each a name of its own")]
+    Missing(&'static str, String),
     /// An effect that the robot cannot have.
     #[error(transparent)]
     Effect(#[from] EffectError),
@@ -91,7 +99,7 @@ pub enum ExportError {
 /// # Errors
 /// A robot that the target cannot start from, or an effect that the robot cannot have.
 pub fn export(target: Target, robot: &Robot, corrected: &Corrected, logs: &[Episode]) -> Result<Exported, ExportError> {
-    if target == Target::Urdf && robot.is_mjcf {
+    if target != Target::Mjcf && robot.is_mjcf {
         return Err(ExportError::NoUrdf);
     }
     let model = &robot.loaded.model;
@@ -104,6 +112,7 @@ pub fn export(target: Target, robot: &Robot, corrected: &Corrected, logs: &[Epis
         .flat_map(|effect| match target {
             Target::Urdf => urdf::carry(effect, &context, |joint| urdf::has_limit(robot, joint)),
             Target::Mjcf => mjcf::carry(effect, &context),
+            Target::IsaacLab => isaaclab::carry(effect, &context, |joint| urdf::has_limit(robot, joint)),
         })
         .collect();
     let held = held(&carried);
@@ -111,6 +120,7 @@ pub fn export(target: Target, robot: &Robot, corrected: &Corrected, logs: &[Epis
     let text = match target {
         Target::Urdf => urdf::write(robot, &totals)?,
         Target::Mjcf => mjcf::write(model, &totals, &held),
+        Target::IsaacLab => isaaclab::write(model, &totals, &corrected.effects),
     };
     let mut ledger = predict(robot, corrected, logs, &carried)?;
     ledger.target = target.name().to_owned();
@@ -190,12 +200,18 @@ fn notes(target: Target, corrected: &Corrected, totals: &Totals) -> Vec<String> 
         ));
     }
     if target == Target::Mjcf {
+        if totals.model.joints().iter().any(|joint| joint.limits.effort.is_some()) {
+            notes.push("commands are held to the effort limits of the robot description, as ctrlrange".to_owned());
+        }
         notes.push("shapes, meshes and contacts of the robot description are not carried over".to_owned());
         let turning = totals.transmissions.iter().filter(|t| t.rotor > 0.0);
         for joint in turning.map(|t| &totals.model.joints()[t.joint].name) {
             let shown = if corrected.encoder_side == EncoderSide::Motor { motor_joint(joint) } else { joint.clone() };
             notes.push(format!("the encoder of `{joint}` shows the position of joint `{shown}` of the file"));
         }
+    }
+    if target == Target::IsaacLab {
+        notes.push("not run here: Isaac Sim is not where the project is tested".to_owned());
     }
     if corrected.alignment != 0.0 {
         let late = corrected.alignment;

@@ -25,7 +25,7 @@ pub fn has_limit(robot: &Robot, joint: &str) -> bool {
 /// The text with the sums of the effects that a URDF holds.
 ///
 /// # Errors
-/// A text that is no XML, which no robot comes from.
+/// A text that is no XML or lacks a link or joint of the model, which no robot comes from.
 pub fn write(robot: &Robot, totals: &Totals) -> Result<String, ExportError> {
     let document = Document::parse(robot.text).map_err(|error| ExportError::Text(error.to_string()))?;
     let root = document.root_element();
@@ -35,9 +35,10 @@ pub fn write(robot: &Robot, totals: &Totals) -> Result<String, ExportError> {
         let (old, new) = (&joint.inertia, &totals.model.joints()[j].inertia);
         if old != new {
             let body: Vec<&LinkFrame> = robot.loaded.links.iter().filter(|link| link.joint == Some(j)).collect();
-            inertial::correct(&mut edits, root, &body, &difference(new, old));
+            inertial::correct(&mut edits, root, &body, &difference(new, old))?;
         }
-        let Some(node) = named(root, "joint", &joint.name) else { continue };
+        let missing = || ExportError::Missing("joint", joint.name.clone());
+        let node = named(root, "joint", &joint.name).ok_or_else(missing)?;
         let friction =
             [("damping", joint.damping, totals.damping[j]), ("friction", joint.friction, totals.friction[j])];
         dynamics(&mut edits, node, &friction);
@@ -78,7 +79,11 @@ pub fn paste(nominal: &Model, totals: &Totals) -> Vec<String> {
 
 /// The link or joint of a name.
 fn named<'a>(robot: Node<'a, 'a>, kind: &str, name: &str) -> Option<Node<'a, 'a>> {
-    let is = |node: &Node| node.is_element() && node.tag_name().name() == kind && node.attribute("name") == Some(name);
+    let is = |node: &Node| {
+        node.is_element()
+            && node.tag_name().name() == kind
+            && node.attribute("name").map(str::trim) == Some(name.trim())
+    };
     robot.children().find(is)
 }
 

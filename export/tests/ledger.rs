@@ -65,6 +65,7 @@ fn every_kind_has_its_line_and_no_figure_without_logs() {
         ([count(How::Written), count(How::Approximated), count(How::LeftOut)], ledger)
     };
     assert_eq!(how(Target::Urdf).0, [7, 3, 12]);
+    assert_eq!(how(Target::IsaacLab).0, [8, 4, 10]);
     let (counts, mjcf) = how(Target::Mjcf);
     // The spring of joint 5 and the play have no rotor behind them; friction by load needs logs; contact belongs to its log.
     assert_eq!(counts, [18, 1, 4]);

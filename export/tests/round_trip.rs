@@ -146,6 +146,28 @@ fn the_way_back_from_an_mjcf_is_the_same_as_from_the_urdf() {
 }
 
 #[test]
+fn isaac_lab_gets_efforts_of_joints_and_steps_of_delay() {
+    let (xml, loaded) = robots().swap_remove(1);
+    let json = r#"[{"kind": "viscous_friction", "viscous": {"joint2": 1.5}}, {"kind": "armature", "armature": {"joint3": 0.25}},
+        {"kind": "stribeck_friction", "coulomb": {"joint1": 1.0}, "static": {"joint1": 2.5}, "stribeck_velocity": {"joint1": 0.1}},
+        {"kind": "torque_saturation", "limit": {"joint6": 3.5}}, {"kind": "actuation_delay", "delay": 0.0126}]"#;
+    let text = exported(Target::IsaacLab, &xml, &loaded, effects(json, &loaded.model));
+    for line in [
+        r#"viscous_friction={r"joint1": 0.0, r"joint2": 1.5, "#,
+        r#"armature={r"joint1": 0.0, r"joint2": 0.0, r"joint3": 0.25, "#,
+        r#" friction={r"joint1": 2.5, "#,
+        r#"dynamic_friction={r"joint1": 1.0, "#,
+        r#"r"joint5": 28.0, r"joint6": 3.5}"#,
+        "min_delay=3,",
+        "max_delay=3,",
+        "stiffness=0.0,",
+        "NOT RUN",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+}
+
+#[test]
 fn every_other_byte_of_a_urdf_is_kept() {
     for (xml, loaded) in robots() {
         assert_eq!(exported(Target::Urdf, &xml, &loaded, vec![]), xml);

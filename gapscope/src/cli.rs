@@ -130,7 +130,7 @@ pub struct Export {
     /// Robot description that the diagnosis was made with: URDF, xacro or MJCF
     #[arg(long, value_name = "FILE")]
     pub robot: PathBuf,
-    /// What to write: urdf, mjcf, or both
+    /// What to write, separated by commas; isaaclab needs the URDF and writes it too
     #[arg(long, value_enum, value_name = "TARGET", value_delimiter = ',', required = true)]
     pub to: Vec<Target>,
     /// Logs on which to predict what the shrink falls by in the target: best ones that the diagnosis did not see
@@ -148,7 +148,7 @@ pub struct Export {
     /// Hold a joint of the robot fixed at zero; joints that the diagnosis did not have are held by themselves
     #[arg(long = "lock", value_name = "JOINT")]
     pub lock: Vec<String>,
-    /// Folder for robot.urdf, robot.xml and ledger.json [default: a new folder in that of the results]
+    /// Folder for robot.urdf, robot.xml, isaaclab_robot.py and ledger.json [default: a new folder in that of the results]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Replace files that are in the folder already
@@ -163,6 +163,8 @@ pub enum Target {
     Urdf,
     /// MuJoCo's model file
     Mjcf,
+    /// A configuration for Isaac Lab
+    Isaaclab,
 }
 
 impl From<Target> for gapscope_export::Target {
@@ -170,6 +172,7 @@ impl From<Target> for gapscope_export::Target {
         match target {
             Target::Urdf => gapscope_export::Target::Urdf,
             Target::Mjcf => gapscope_export::Target::Mjcf,
+            Target::Isaaclab => gapscope_export::Target::IsaacLab,
         }
     }
 }

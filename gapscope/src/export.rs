@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use gapscope_datasets::Episode;
 use gapscope_diagnosis::Corrected;
 use gapscope_dynamics::Loaded;
-use gapscope_export::{Exported, LEDGER_SCHEMA, Ledger, Robot, TargetLedger, export};
+use gapscope_export::{Exported, LEDGER_SCHEMA, Ledger, Robot, Target, TargetLedger, export};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -28,11 +28,14 @@ pub fn run(args: &Export) -> Result<String> {
         Some(out) => out.clone(),
         None => output::new_folder(file.parent().unwrap_or(std::path::Path::new("")), "export")?,
     };
-    let mut targets: Vec<gapscope_export::Target> = Vec::new();
+    let mut targets: Vec<Target> = Vec::new();
     for target in args.to.iter().map(|&target| target.into()) {
         if !targets.contains(&target) {
             targets.push(target);
         }
+    }
+    if targets.contains(&Target::IsaacLab) && !targets.contains(&Target::Urdf) {
+        targets.push(Target::Urdf);
     }
     let files: Vec<PathBuf> = targets.iter().map(|target| target.file()).chain([LEDGER]).map(|f| out.join(f)).collect();
     if let (Some(there), false) = (files.iter().find(|file| file.symlink_metadata().is_ok()), args.force) {
@@ -249,6 +252,9 @@ mod tests {
         let own = ["export", path(folder), "--robot", path(&robot), "--to", "urdf", "--force", "--out"];
         let error = run(&[&own[..], &[path(&folder.join("logs"))]].concat()).unwrap_err().to_string();
         assert!(error.contains("the robot description itself"), "{error}");
+        run(&["export", path(folder), "--robot", path(&robot), "--to", "isaaclab", "--out", path(&folder.join("lab"))])
+            .unwrap();
+        assert!(folder.join("lab/isaaclab_robot.py").exists() && folder.join("lab/robot.urdf").exists());
         // By itself it makes a new folder beside the results each time.
         run(&own[..7]).unwrap();
         run(&own[..6]).unwrap();

@@ -2,6 +2,7 @@
 
 use super::edit::Edits;
 use super::named;
+use crate::ExportError;
 use crate::number::{from_roll_pitch_yaw, number, vector};
 use gapscope_dynamics::{Inertia, LinkFrame, Placement};
 use glam::{DMat3, DQuat, DVec3};
@@ -12,13 +13,15 @@ use roxmltree::Node;
 /// `delta` is what is added, in the frame of the moved link; links other than those that take it keep their bytes. The
 /// moved link takes it where it stays a body with it, else the first other link that does. Where none does, the moved link
 /// takes the inertia of them all, and the others are left without.
-pub fn correct(edits: &mut Edits, robot: Node, body: &[&LinkFrame], delta: &Inertia) {
+///
+/// # Errors
+/// A link of the body that the text does not have.
+pub fn correct(edits: &mut Edits, robot: Node, body: &[&LinkFrame], delta: &Inertia) -> Result<(), ExportError> {
     let own: Vec<Inertia> = body.iter().map(|link| of_link(robot, &link.name)).collect();
     let taker = body.iter().zip(&own).position(|(link, own)| own.add(&seen_from(link, delta)).is_physical());
     if let Some(taker) = taker {
         let new = own[taker].add(&seen_from(body[taker], delta));
-        write(edits, robot, &body[taker].name, &new);
-        return;
+        return write(edits, robot, &body[taker].name, &new);
     }
     let mut sum = *delta;
     for (link, own) in body.iter().zip(&own) {
@@ -26,11 +29,12 @@ pub fn correct(edits: &mut Edits, robot: Node, body: &[&LinkFrame], delta: &Iner
     }
     for (i, (link, own)) in body.iter().zip(&own).enumerate() {
         if i == 0 {
-            write(edits, robot, &link.name, &sum);
+            write(edits, robot, &link.name, &sum)?;
         } else if *own != Inertia::ZERO {
-            write(edits, robot, &link.name, &Inertia::ZERO);
+            write(edits, robot, &link.name, &Inertia::ZERO)?;
         }
     }
+    Ok(())
 }
 
 /// The inertia of the moved link's frame in the frame of a link that is fixed to it.
@@ -75,8 +79,8 @@ pub fn child<'a>(element: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
 }
 
 /// Writes an inertia in the axes of the link, about its centre of mass.
-fn write(edits: &mut Edits, robot: Node, link: &str, inertia: &Inertia) {
-    let Some(node) = named(robot, "link", link) else { return };
+fn write(edits: &mut Edits, robot: Node, link: &str, inertia: &Inertia) -> Result<(), ExportError> {
+    let node = named(robot, "link", link).ok_or_else(|| ExportError::Missing("link", link.to_owned()))?;
     let com = inertia.center_of_mass().unwrap_or_default();
     let about_com = inertia.about_center_of_mass();
     let (x, y, z) = (about_com.x_axis, about_com.y_axis, about_com.z_axis);
@@ -90,7 +94,7 @@ fn write(edits: &mut Edits, robot: Node, link: &str, inertia: &Inertia) {
     let mass = || format!("<mass value=\"{}\"/>", number(inertia.mass));
     let Some(inertial) = child(node, "inertial") else {
         edits.insert_first(node, &format!("<inertial>\n  {}\n  {}\n  {}\n</inertial>", place(), mass(), whole()));
-        return;
+        return Ok(());
     };
     match child(inertial, "origin") {
         Some(origin) => {
@@ -108,4 +112,5 @@ fn write(edits: &mut Edits, robot: Node, link: &str, inertia: &Inertia) {
         Some(node) => moments.iter().for_each(|(name, value)| edits.set(node, name, &number(*value))),
         None => edits.insert_last(inertial, &whole()),
     }
+    Ok(())
 }

@@ -11,7 +11,7 @@ use crate::schema::*;
 use crate::signals::{Signals, standstill};
 use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
-use gapscope_effects::{EffectError, Plant};
+use gapscope_effects::{Effect, EffectError, Plant};
 
 /// Measured, nominal and corrected torque of one log, joint-major at the rows of the comparison; N m or N.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,6 +93,41 @@ pub fn evaluate(
     let predictions =
         signals.iter().enumerate().map(|(e, s)| predictions(s, &band, e, &before_rows, &after_rows)).collect();
     Ok((evaluation, predictions))
+}
+
+/// Change of the torque gap on logs by a corrected model, and by the same with other lists of effects in the place of its own.
+///
+/// All are held against the floor of the corrected model itself, so that their shrinks compare; the corrected model comes
+/// first, the lists follow in their order.
+///
+/// # Errors
+/// An effect that the robot cannot have.
+pub fn torque_changes(
+    model: &Model,
+    episodes: &[Episode],
+    corrected: &Corrected,
+    instead: &[Vec<Effect>],
+) -> Result<Vec<Change>, EffectError> {
+    let signals = signals(model, episodes, &mut Vec::new());
+    let n = model.dof();
+    let (still, weights) = (per_joint(model, &corrected.standstill), per_joint(model, &corrected.weights));
+    let band = Band::whole(&signals);
+    let nominal: Vec<Vec<Vec<f64>>> =
+        signals.iter().map(|s| residual(&mut Plant::nominal(model, s.dt), model, s, &still, 0.0)).collect();
+    let squares = |residuals: &[Vec<Vec<f64>>]| gap::squares(&band, &gap::at_rows(&band, residuals, n), |_| true);
+    let before = squares(&nominal);
+    let mut floor = None;
+    std::iter::once(&corrected.effects)
+        .chain(instead)
+        .map(|effects| {
+            let held = Corrected { effects: effects.clone(), ..corrected.clone() };
+            let after: Vec<Vec<Vec<f64>>> =
+                signals.iter().map(|s| held.residual(model, s)).collect::<Result<_, EffectError>>()?;
+            let floor =
+                *floor.get_or_insert_with(|| gap::weighted_floor(&noise_floor(&signals, &band, &after, n), &weights));
+            Ok(gap::change(&before, &squares(&after), &weights, floor))
+        })
+        .collect()
 }
 
 fn predictions(s: &Signals, band: &Band, episode: usize, before: &Rows, after: &Rows) -> Predictions {

@@ -40,7 +40,7 @@ mod verdict;
 
 pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};
 pub use diagnose::{Outcome, Progress, diagnose};
-pub use evaluate::{Predictions, evaluate};
+pub use evaluate::{Predictions, evaluate, torque_changes};
 pub use experiment::FILE as NEXT_EXPERIMENT;
 pub use gapscope_effects::EncoderSide;
 pub use rollout::{BoundGrowth, Contender, ModelRollouts, RolloutError, RolloutOptions, rollouts};

@@ -21,6 +21,8 @@ pub enum Command {
     Diagnose(Diagnose),
     /// Measure the gap on other logs, before and after the corrections that a diagnosis found
     Evaluate(Evaluate),
+    /// Write the corrected model for a simulator, with a ledger of what it holds there
+    Export(Export),
     /// Show how the model's error grows over the horizon, beside what one-step errors and Jacobians allow
     Rollout(Rollout),
     /// Run a study of this project's own, as its documents show it
@@ -118,6 +120,61 @@ pub struct Evaluate {
     /// Replace the predictions file if it exists
     #[arg(long)]
     pub force: bool,
+}
+
+/// Arguments of `export`.
+#[derive(Debug, Args)]
+pub struct Export {
+    /// Folder that `diagnose` wrote, or the corrected.json in it
+    pub results: PathBuf,
+    /// Robot description that the diagnosis was made with: URDF, xacro or MJCF
+    #[arg(long, value_name = "FILE")]
+    pub robot: PathBuf,
+    /// What to write, separated by commas; isaaclab needs the URDF and writes it too
+    #[arg(long, value_enum, value_name = "TARGET", value_delimiter = ',', required = true)]
+    pub to: Vec<Target>,
+    /// Logs on which to predict what the shrink falls by in the target: best ones that the diagnosis did not see
+    #[arg(long, value_name = "LOG", num_args = 1..)]
+    pub logs: Vec<PathBuf>,
+    /// Read a column of another name, e.g. `position.joint1=/joint_states/j1/pos`; may be given several times
+    #[arg(long = "map", value_name = "NATIVE=COLUMN")]
+    pub map: Vec<String>,
+    /// Read column names from a TOML file
+    #[arg(long, value_name = "FILE")]
+    pub map_file: Option<PathBuf>,
+    /// Pass an argument to xacro, where the robot description is a xacro file; may be given several times
+    #[arg(long = "xacro-arg", value_name = "NAME:=VALUE")]
+    pub xacro_args: Vec<String>,
+    /// Hold a joint of the robot fixed at zero; joints that the diagnosis did not have are held by themselves
+    #[arg(long = "lock", value_name = "JOINT")]
+    pub lock: Vec<String>,
+    /// Folder for robot.urdf, robot.xml, isaaclab_robot.py and ledger.json [default: a new folder in that of the results]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace files that are in the folder already
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Targets by their names on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Target {
+    /// The robot's own URDF, edited
+    Urdf,
+    /// MuJoCo's model file
+    Mjcf,
+    /// A configuration for Isaac Lab
+    Isaaclab,
+}
+
+impl From<Target> for gapscope_export::Target {
+    fn from(target: Target) -> gapscope_export::Target {
+        match target {
+            Target::Urdf => gapscope_export::Target::Urdf,
+            Target::Mjcf => gapscope_export::Target::Mjcf,
+            Target::Isaaclab => gapscope_export::Target::IsaacLab,
+        }
+    }
 }
 
 /// Arguments of `rollout`.

@@ -5,6 +5,7 @@ mod cli;
 mod demo;
 mod diagnose;
 mod evaluate;
+mod export;
 mod generate;
 mod input;
 mod learned;
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Study(study) => study::run(&study),
         Command::Demo(args) => demo::run(&args),

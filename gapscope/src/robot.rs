@@ -47,6 +47,16 @@ fn is_xacro(text: &str) -> bool {
 }
 
 impl Description {
+    /// The text, xacro expanded.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Whether it is MJCF.
+    pub fn is_mjcf(&self) -> bool {
+        Model::is_mjcf(&self.text)
+    }
+
     /// The model, with the joints named in `locked` held at zero. Files that an MJCF includes lie beside `path`.
     ///
     /// # Errors
@@ -54,7 +64,7 @@ impl Description {
     pub fn model(&self, path: &Path, locked: &[String]) -> Result<Loaded> {
         let locked: Vec<&str> = locked.iter().map(String::as_str).collect();
         let cannot = || format!("{} cannot be used", path.display());
-        let mut loaded = if Model::is_mjcf(&self.text) {
+        let mut loaded = if self.is_mjcf() {
             let include = |file: &str| {
                 let file = path.parent().unwrap_or(Path::new("")).join(file);
                 std::fs::read_to_string(file).map_err(|error| error.to_string())

@@ -20,7 +20,27 @@ pub(crate) struct Drive {
     pub(crate) half_gap: f64,
 }
 
+/// What stands between the motor and the link of one joint, as the plant has settled it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transmission {
+    /// Index of the joint.
+    pub joint: usize,
+    /// Inertia of the rotor on the joint's side of the gear, kg m² (kg); 0 where the motor follows at once.
+    pub rotor: f64,
+    /// Stiffness of the spring, or of the contact behind the play, N m/rad (N/m).
+    pub stiffness: f64,
+    /// Its damping, N m s/rad (N s/m).
+    pub damping: f64,
+    /// The whole play, rad (m).
+    pub gap: f64,
+}
+
 impl Drive {
+    pub(super) fn transmission(&self) -> Transmission {
+        let Drive { joint, rotor, stiffness, damping, half_gap, .. } = *self;
+        Transmission { joint, rotor, stiffness, damping, gap: 2.0 * half_gap }
+    }
+
     pub(super) fn rigid(joint: usize) -> Drive {
         Drive { joint, motor: None, rotor: 0.0, stiffness: 0.0, damping: 0.0, half_gap: 0.0 }
     }

@@ -13,6 +13,7 @@ mod state;
 mod step;
 
 pub(crate) use drive::CONTACT;
+pub use drive::Transmission;
 pub(crate) use friction::{Bristle, Direction};
 
 use crate::effect::check;
@@ -222,6 +223,11 @@ impl Plant {
     /// The rigid-body model with the inertial effects and the gravity of this plant.
     pub fn model(&self) -> &Model {
         &self.model
+    }
+
+    /// The springs and plays between motors and links, one for each joint that has any.
+    pub fn transmissions(&self) -> Vec<Transmission> {
+        self.drives.iter().map(Drive::transmission).collect()
     }
 
     pub(crate) fn joint(&self, kind: Kind, joint: &str) -> Result<usize, EffectError> {

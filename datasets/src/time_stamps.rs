@@ -10,6 +10,8 @@ const GAP_STEPS: f64 = 5.0;
 const GAP_SECONDS: f64 = 0.02;
 /// A part with fewer samples is left out.
 const SHORTEST: usize = 20;
+/// A median step longer than this, s, shows no motion of a robot: stamps in milliseconds begin at 1 s.
+const LONGEST_STEP: f64 = 0.2;
 /// Jitter is worth a word from this share of the step on.
 const JITTER: f64 = 0.05;
 
@@ -61,8 +63,9 @@ pub(crate) fn split(table: Table, name: &str) -> (Vec<Episode>, Vec<String>) {
     }
     if !parts.is_empty() {
         notes.extend(jitter(&steps, dt, &is_gap));
-        if dt > 0.2 {
-            notes.push(format!("the median step of time is {dt} s: if the stamps are in another unit, scale them in the column map (time = {{ column = \"…\", scale = 0.001 }} for ms)"));
+        if dt > LONGEST_STEP {
+            parts.clear();
+            notes.push(format!("the median step of time is {dt} s, too long to show how a robot moves: left out; if the stamps are in another unit, scale them in the column map (time = {{ column = \"…\", scale = 0.001 }} for ms)"));
         }
     }
     (parts, notes)
@@ -155,6 +158,6 @@ mod tests {
         let (parts, notes) = split(table(even(7, 0.0)), "a");
         assert!(parts.is_empty() && notes[0].contains("only 7 samples"), "{notes:?}");
         let (parts, notes) = split(table((0..100).map(f64::from).collect()), "a");
-        assert!(parts.len() == 1 && notes[0].contains("another unit"), "{notes:?}");
+        assert!(parts.is_empty() && notes[0].contains("another unit"), "{notes:?}");
     }
 }

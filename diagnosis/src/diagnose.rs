@@ -28,7 +28,7 @@ use std::collections::BTreeMap;
 /// A rival as likely as this is named beside the choice.
 const WORTH_NAMING: f64 = 0.01;
 /// An effect whose best rival is less likely by no more than this cannot be told from it, nats: twenty to one.
-pub(crate) const TIE: f64 = 3.0;
+const TIE: f64 = 3.0;
 /// A joint moves if this part of its samples is in motion, ...
 const MOVING_PART: f64 = 0.05;
 /// ... and its top speed is this many times the speed that counts as standing.
@@ -106,7 +106,9 @@ pub fn diagnose(
     logs.known = Known::new(model, &logs.signals, &logs.band, &logs.still, &logs.moving);
     logs.look_for_pushes()?;
     let chosen = logs.choose(progress)?;
-    logs.conclude(&chosen, data, progress)
+    progress("rivals", 0.55);
+    let rivals = climb::rivals(&chosen.all, &chosen.choice);
+    logs.conclude(&chosen, &rivals, data, progress)
 }
 
 /// Signals of every episode that is long enough.
@@ -127,13 +129,21 @@ fn noisier(model: &Model, episodes: &[Episode], signals: &[Signals]) -> Vec<Sign
     signals.par_iter().enumerate().filter_map(noisier).collect()
 }
 
-/// Which joints move enough to tell anything.
+/// Which joints tell anything: those that move enough, under an effort that was logged.
 fn moving(signals: &[Signals], still: &[f64], model: &Model, findings: &mut Vec<String>) -> Vec<bool> {
     model
         .joints()
         .iter()
         .enumerate()
         .map(|(j, joint)| {
+            let constant = |effort: &[f64]| effort.windows(2).all(|pair| pair[0] == pair[1]);
+            if !signals.is_empty() && signals.iter().all(|s| constant(&s.effort[j])) {
+                findings.push(format!(
+                    "{}: no effort of it was logged: nothing is said about it, and its motion counts for the others alone",
+                    joint.name
+                ));
+                return false;
+            }
             let speeds = || signals.iter().flat_map(|s| s.v[j].iter()).map(|v| v.abs());
             let in_motion = speeds().filter(|v| *v >= still[j]).count() as f64;
             let moves = in_motion >= MOVING_PART * speeds().count() as f64
@@ -319,7 +329,13 @@ impl Logs<'_> {
         gap::at_rows(&self.band, &residuals, self.model.dof())
     }
 
-    fn conclude(&self, chosen: &Chosen, data: DataSummary, progress: Progress<'_>) -> Result<Outcome, EffectError> {
+    fn conclude(
+        &self,
+        chosen: &Chosen,
+        rivals: &[Rival],
+        data: DataSummary,
+        progress: Progress<'_>,
+    ) -> Result<Outcome, EffectError> {
         let model = self.model;
         let weights = gap::weights(&self.signals, &self.moving);
         let (problem, fit) = (&chosen.exact, &chosen.fit);
@@ -371,7 +387,7 @@ impl Logs<'_> {
         let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());
         // What a law outside the catalogue accounts for does not speak against the effects beside it.
         let misfit = (verdict != Verdict::Explained).then_some(&beside);
-        let found = self.found_effects(chosen, misfit, change)?;
+        let found = self.found_effects(chosen, rivals, misfit, change)?;
         let corrected = Corrected {
             schema: MODEL_SCHEMA.to_owned(),
             robot: model.name().to_owned(),
@@ -395,14 +411,9 @@ impl Logs<'_> {
         let left = remaining.regimes.clone();
         evidence.remaining = (!found.is_empty()).then_some(remaining);
         progress("next experiment", 0.95);
-        let (next_experiment, trajectory) = experiment::next_experiment(
-            &self.data(&chosen.noise),
-            &chosen.all,
-            &chosen.choice,
-            &chosen.rivals,
-            &found,
-        )?
-        .unzip();
+        let (next_experiment, trajectory) =
+            experiment::next_experiment(&self.data(&chosen.noise), &chosen.all, &chosen.choice, rivals, &found)?
+                .unzip();
         let drives = self.least_drives(problem, fit, side, &chosen.noise)?;
         let diagnosis = Diagnosis {
             schema: DIAGNOSIS_SCHEMA.to_owned(),
@@ -414,8 +425,8 @@ impl Logs<'_> {
             next_experiment,
             power: power::power(model, &chosen.all, &chosen.choice.set, &drives),
             effects: found,
-            alternatives: alternatives(&chosen.all, &chosen.rivals),
-            why: self.why(chosen),
+            alternatives: alternatives(&chosen.all, rivals),
+            why: self.why(chosen, rivals),
             unexplained: Unexplained {
                 fraction: unexplained,
                 learnable,
@@ -440,6 +451,7 @@ impl Logs<'_> {
     fn found_effects(
         &self,
         chosen: &Chosen,
+        rivals: &[Rival],
         misfit: Option<&Judged>,
         change: impl Fn(&Rows) -> Change,
     ) -> Result<Vec<FoundEffect>, EffectError> {
@@ -453,9 +465,16 @@ impl Logs<'_> {
             let turned = chosen.turned.as_ref().filter(|t| t.drive.kind == kind);
             // The choice sees a drive by its rotor.
             let seen_as = if turned.is_some() { Kind::Armature } else { kind };
-            let rival = chosen.rivals.iter().find(|r| r.without == seen_as);
+            let rival = rivals.iter().find(|r| r.without == seen_as);
             let late = chosen.late_doubt.filter(|_| LATE.contains(&kind));
-            let odds = turned.map(|turned| turned.odds).or(rival.map(|r| r.odds)).unwrap_or(f64::INFINITY);
+            let exact = chosen.needed.iter().find(|(needed, _)| *needed == kind).map(|(_, odds)| *odds);
+            let odds = match turned {
+                Some(turned) => turned.odds,
+                None => exact.or(rival.map(|r| r.odds)).unwrap_or(f64::INFINITY),
+            };
+            // What could be another is no surer than that it is not.
+            let tied = rival.map(|r| r.odds).filter(|odds| turned.is_none() && *odds < TIE);
+            let odds = tied.map_or(odds, |tied| odds.min(tied.max(0.0)));
             let doubt = late.unwrap_or(0.0).max(1.0 / (1.0 + odds.exp()));
             let mut confused = rival
                 .filter(|_| turned.is_none() && late.is_none())
@@ -494,14 +513,13 @@ impl Logs<'_> {
 
     /// The comparisons that decided: each kind found against the best account without it, each spring or play that was tried
     /// against a rigid drive, and each kind that was not found against what was.
-    fn why(&self, chosen: &Chosen) -> Vec<Why> {
+    fn why(&self, chosen: &Chosen, rivals: &[Rival]) -> Vec<Why> {
         let names = |joints: &[usize]| joints.iter().map(|&j| self.model.joints()[j].name.clone()).collect();
         let set = |kinds: Vec<Kind>| -> String {
             let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
             if names.is_empty() { "nothing".into() } else { names.join(" + ") }
         };
-        let mut why: Vec<Why> = chosen
-            .rivals
+        let mut why: Vec<Why> = rivals
             .iter()
             .map(|rival| Why {
                 proposed: rival.without.name().to_owned(),

@@ -2,7 +2,7 @@
 
 use crate::climb::{self, Choice, Competition, LATE, Rival};
 use crate::corrected::residual;
-use crate::diagnose::{Logs, Progress, TIE};
+use crate::diagnose::{Logs, Progress};
 use crate::estimate::Fit;
 use crate::floor::noise_floor;
 use crate::gap;
@@ -16,10 +16,10 @@ use rayon::prelude::*;
 
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
-/// Times that a likelier account takes the place of what was chosen, at most.
-const CHALLENGES: usize = 8;
-/// A kind without which the logs are less likely by no more than this, nats, is held against the exact law. One beyond
-/// calibration is looked for anew without it as well: what was chosen around it may have been chosen because of it.
+/// Times that a likelier account takes the place of what was chosen.
+const AGAIN: usize = 2;
+/// A kind without which the logs are less likely by no more than this, nats, is looked at again: what was chosen around it may
+/// have been chosen because of it.
 const DOUBTFUL: f64 = 60.0;
 /// Nats that a spring or play must bring beside its rotor: as rare as any kind, on either side of the gear, a knob that the
 /// logs know to a twentieth of its range, and what the best of some hundred tries finds in noise.
@@ -29,7 +29,6 @@ const TURNS: f64 = 3.0 + 0.7 + 3.0 + 9.0;
 type Borne = Vec<Vec<Option<f64>>>;
 
 /// What the search came to.
-#[derive(Clone)]
 pub(crate) struct Chosen {
     /// Every candidate, around the parameters found.
     pub all: Problem,
@@ -47,8 +46,8 @@ pub(crate) struct Chosen {
     pub late_doubt: Option<f64>,
     /// Springs and plays that were held against a rigid drive, and by how many nats each won.
     pub tried: Vec<(Candidate, f64)>,
-    /// For each kind in it the likeliest account without it that was met, held at the exact law where it is near.
-    pub rivals: Vec<Rival>,
+    /// By how many nats the logs, held against the exact law, speak for each kind that was held so.
+    pub needed: Vec<(Kind, f64)>,
 }
 
 /// A drive that turns on its own.
@@ -77,19 +76,16 @@ impl Chosen {
         evidence.at_rest(&own_borne, &least, &counts, &logs.band);
         others_evidence.at_rest(&others_borne, &least, &counts, &logs.band);
         // A law that filters what was measured makes more or less of its noise, and leaves more or less for that alone. One with
-        // blows may make anything of it: that it makes more says nothing for it.
+        // blows makes anything of it.
         let differ = |a: &Chosen, b: &Chosen| {
             let has = |e: &Entry| b.exact.entries.iter().any(|other| other.candidate == e.candidate);
             a.exact.entries.iter().any(|e| e.candidate.filters() && !has(e))
         };
-        let filtered = differ(self, other) || differ(other, self);
+        let filtered = (differ(self, other) || differ(other, self)) && !self.blows() && !other.blows();
         let quieter: f64 = (0..own.len())
             .filter(|&j| filtered && own[j] > 0.0 && others[j] > 0.0)
             .map(|j| self.exact.rows(j) / counts[j] * (others[j] / own[j]).ln())
             .sum();
-        let least_of_it = if self.blows() { 0.0 } else { f64::NEG_INFINITY };
-        let most_of_it = if other.blows() { 0.0 } else { f64::INFINITY };
-        let quieter = quieter.max(least_of_it).min(most_of_it);
         Ok(evidence.against(&others_evidence, quieter) + self.prior() - other.prior())
     }
 
@@ -110,19 +106,13 @@ impl Chosen {
             turned: self.turned.clone(),
             late_doubt: None,
             tried: self.tried.clone(),
-            rivals: self.rivals.clone(),
+            needed: self.needed.clone(),
         }
     }
 
     /// Whether a drive in it hits a stop, from which noise comes back as blows.
     fn blows(&self) -> bool {
         self.exact.entries.iter().any(|e| e.candidate.blows())
-    }
-
-    /// Whether another account has the same candidates and the same drives.
-    fn is_same(&self, other: &Chosen) -> bool {
-        let drive = |chosen: &Chosen| chosen.turned.as_ref().map(|turned| (turned.place, turned.drive.kind));
-        self.choice.set == other.choice.set && drive(self) == drive(other)
     }
 
     fn turns(&self) -> bool {
@@ -158,9 +148,9 @@ impl Logs<'_> {
         rows.collect()
     }
 
-    /// The account with Stribeck friction in the place of Coulomb friction, where it is likelier, and by how many nats: the rise towards
+    /// What was chosen, with Stribeck friction in the place of its Coulomb friction where that is likelier: the rise towards
     /// rest of a joint that leaves rest too fast shows in what it bears there, and in no row of its motion.
-    fn sticking(&self, chosen: &Chosen) -> Result<Option<(Chosen, f64)>, EffectError> {
+    fn sticking(&self, chosen: Chosen) -> Result<Chosen, EffectError> {
         let of = |c: usize| &chosen.all.entries[c].candidate;
         let rest = self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?;
         let bears = |c: usize| {
@@ -180,12 +170,11 @@ impl Logs<'_> {
         let mut set: Vec<usize> = chosen.choice.set.iter().map(|&c| if slides(c) { sticks(c) } else { c }).collect();
         set.sort_unstable();
         if set == chosen.choice.set {
-            return Ok(None);
+            return Ok(chosen);
         }
         let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
         let sticking = chosen.with(Choice { set }, exact, fit);
-        let odds = sticking.odds_against(chosen, self)?;
-        Ok((odds > 0.0).then_some((sticking, odds)))
+        Ok(if sticking.odds_against(&chosen, self)? > 0.0 { sticking } else { chosen })
     }
 
     /// The problem of all candidates, the set chosen from it, and the problem of that set alone at its exact parameters.
@@ -193,105 +182,68 @@ impl Logs<'_> {
         let chosen = self.best_of(progress)?;
         let chosen = self.delay_or_lag(chosen)?;
         let chosen = self.drive(chosen, progress)?;
-        self.settle(self.shown(chosen, progress)?, progress)
+        let chosen = self.likeliest(chosen, progress)?;
+        let chosen = self.needed(self.shown(chosen, progress)?, progress)?;
+        let chosen = self.sticking(chosen)?;
+        self.delay_or_lag(chosen)
     }
 
-    /// The likeliest account: one that no rival beats at the exact law. Each challenge that is won starts them all anew. Where
-    /// accounts beat each other in a circle, the one that lost by least.
-    fn settle(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        let mut beaten: Vec<(Chosen, f64)> = Vec::new();
-        while beaten.len() < CHALLENGES {
-            let better = match self.challenge(&mut chosen, true, progress)? {
-                Some(better) => Some(better),
-                None => self.sticking(&chosen)?,
-            };
-            if let Some((better, odds)) = better {
-                let again = beaten.iter().position(|(account, _)| account.is_same(&better));
-                beaten.push((std::mem::replace(&mut chosen, better), odds));
-                let Some(first) = again else { continue };
-                let circle = beaten.drain(first..).min_by(|a, b| a.1.total_cmp(&b.1));
-                chosen = circle.map_or(chosen, |(account, _)| account);
+    /// The likeliest account: where the best one without a kind is likelier than what was chosen, that one.
+    fn likeliest(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        for _ in 0..AGAIN {
+            let mut rivals = climb::rivals(&chosen.all, &chosen.choice);
+            rivals.sort_by(|a, b| a.odds.total_cmp(&b.odds));
+            let Some(rival) = rivals.into_iter().next().filter(|rival| rival.odds < 0.0) else { break };
+            let turned = chosen.turned.clone().filter(|turned| rival.choice.set.contains(&turned.place));
+            let next = self.converge(chosen.all.clone(), rival.choice, chosen.noise.clone(), turned, progress)?;
+            if next.odds_against(&chosen, self)? <= 0.0 {
                 break;
             }
-            let before = chosen.clone();
-            chosen = self.delay_or_lag(chosen)?;
-            if chosen.is_same(&before) {
-                return Ok(chosen);
-            }
-            beaten.push((before, f64::INFINITY));
+            chosen = Chosen { tried: chosen.tried, ..next };
         }
-        self.challenge(&mut chosen, false, progress)?;
         Ok(chosen)
     }
 
-    /// Each kind of what was chosen held at its exact law against the best accounts without it: without replacement, and
-    /// with whatever else takes its place. The first that is likelier, and by how many nats, where one may take its place;
-    /// otherwise what was chosen keeps its rivals.
-    fn challenge(
-        &self,
-        chosen: &mut Chosen,
-        may_lose: bool,
-        progress: Progress<'_>,
-    ) -> Result<Option<(Chosen, f64)>, EffectError> {
+    /// What was chosen, each kind in it held at its exact law against the best accounts without it: without replacement, and
+    /// with whatever else takes its place. A kind that the logs do not speak for goes.
+    fn needed(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let own = chosen.turned.as_ref().map(|turned| turned.place);
-        let mut rivals = climb::rivals(&chosen.all, &chosen.choice);
-        rivals.sort_by(|a, b| a.odds.total_cmp(&b.odds));
-        for rival in &mut rivals {
-            let kind = rival.without;
+        let rivals = climb::rivals(&chosen.all, &chosen.choice);
+        for kind in climb::kinds(&chosen.all, &chosen.choice.set) {
+            let rival = rivals.iter().find(|rival| rival.without == kind);
             let of_kind = |c: &usize| chosen.all.entries[*c].candidate.kind == kind && Some(*c) != own;
             let set: Vec<usize> = chosen.choice.set.iter().copied().filter(|c| !of_kind(c)).collect();
-            let clear = kind.is_calibration() && rival.odds > DOUBTFUL;
+            let clear = kind.is_calibration() && rival.is_some_and(|rival| rival.odds > DOUBTFUL);
             if set.len() == chosen.choice.set.len() || clear {
                 continue;
             }
             let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
             let without = chosen.with(Choice { set }, exact, fit);
-            let odds = chosen.odds_against(&without, self)?;
-            if odds <= 0.0 && may_lose {
-                return Ok(Some((without, -odds)));
-            }
-            let near = if kind.is_calibration() { TIE } else { DOUBTFUL };
-            if odds.min(rival.odds).min(rival.by_logs) >= near {
-                if odds < rival.odds {
-                    meet(rival, chosen, &without, odds);
-                }
+            let mut odds = chosen.odds_against(&without, self)?;
+            if odds <= 0.0 {
+                chosen = without;
                 continue;
             }
-            let first = rival.choice.clone();
-            meet(rival, chosen, &without, odds);
-            let next = self.without(chosen, first, kind, progress)?;
-            let odds = chosen.odds_against(&next, self)?;
-            if odds < 0.0 && may_lose {
-                let mut open = next.all.clone();
-                open.closed.clone_from(&chosen.all.closed);
-                let again =
-                    self.converge(open, next.choice.clone(), next.noise.clone(), next.turned.clone(), progress)?;
-                let mut better = if again.odds_against(&next, self)? > 0.0 { again } else { next };
-                better.all.closed.clone_from(&chosen.all.closed);
-                better.tried.clone_from(&chosen.tried);
-                return Ok(Some((better, -odds)));
+            let doubtful = |rival: &&Rival| !kind.is_calibration() && odds.min(rival.odds) < DOUBTFUL;
+            if let Some(rival) = rival.filter(doubtful) {
+                let mut all = chosen.all.clone();
+                // A delay and a lag are told apart by other means.
+                all.closed.extend(if LATE.contains(&kind) { LATE.to_vec() } else { vec![kind] });
+                let choice = rival.choice.clone();
+                let next = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
+                let next = if next.turned.is_none() { self.drive(next, progress)? } else { next };
+                let over = chosen.odds_against(&next, self)?;
+                if over < 0.0 {
+                    let closed = std::mem::take(&mut chosen.all.closed);
+                    chosen = Chosen { tried: chosen.tried, needed: chosen.needed, ..next };
+                    chosen.all.closed = closed;
+                    continue;
+                }
+                odds = odds.min(over);
             }
-            if odds < rival.odds {
-                meet(rival, chosen, &next, odds);
-            }
+            chosen.needed.push((kind, odds));
         }
-        chosen.rivals = rivals;
-        Ok(None)
-    }
-
-    /// The best account without a kind, from a choice that lacks it.
-    fn without(
-        &self,
-        chosen: &Chosen,
-        choice: Choice,
-        kind: Kind,
-        progress: Progress<'_>,
-    ) -> Result<Chosen, EffectError> {
-        let mut all = chosen.all.clone();
-        // A delay and a lag are told apart by other means.
-        all.closed.extend(if LATE.contains(&kind) { LATE.to_vec() } else { vec![kind] });
-        let next = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
-        if next.turned.is_none() { self.drive(next, progress) } else { Ok(next) }
+        Ok(chosen)
     }
 
     /// What was chosen without the candidates beyond calibration of which every interval holds nothing: what blocks of time do
@@ -328,7 +280,7 @@ impl Logs<'_> {
             let mut all = chosen.all.clone();
             all.closed.push(kind);
             let next = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
-            chosen = Chosen { tried: chosen.tried, ..next };
+            chosen = Chosen { tried: chosen.tried, needed: chosen.needed, ..next };
         }
         Ok(chosen)
     }
@@ -416,16 +368,9 @@ impl Logs<'_> {
                 break (exact, fit);
             }
         };
-        let (late_doubt, tried, rivals) = (None, Vec::new(), Vec::new());
-        Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt, tried, rivals })
+        let (late_doubt, tried, needed) = (None, Vec::new(), Vec::new());
+        Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt, tried, needed })
     }
-}
-
-/// Takes an account for what comes nearest to what was chosen.
-fn meet(rival: &mut Rival, chosen: &Chosen, other: &Chosen, odds: f64) {
-    rival.choice.clone_from(&other.choice);
-    rival.odds = odds;
-    rival.by_logs = odds - chosen.prior() + other.prior();
 }
 
 /// Kinds by what all of which leave rows are weighed. A push is known by when it comes: it is no outlier.

@@ -4,7 +4,9 @@ use crate::{common, support};
 
 use common::{Draw, between, robot, rubbing};
 use gapscope_dynamics::{Data, JointKind, Model, robots};
-use gapscope_effects::{Candidate, Column, Effect, GravityMisalignment, Kind, Motion, Plant};
+use gapscope_effects::{
+    Candidate, Column, Effect, GravityMisalignment, Kind, Motion, Plant, TorqueBias, TorqueGainError, TorqueSaturation,
+};
 use std::collections::BTreeSet;
 use support::motion;
 
@@ -291,5 +293,26 @@ fn couplings_join_neighbours_of_one_unit() {
             assert_eq!(slides(c.joints[0]), slides(c.joints[1]));
             assert_eq!(c.shape.abs(), 1.0);
         }
+    }
+}
+
+#[test]
+fn a_limit_acts_behind_the_gain_and_the_bias_of_its_drive() {
+    let model = robots::model("arm6").unwrap().unwrap().model;
+    let samples = Samples::new(&mut Draw::new(5), &model);
+    let on = |value: f64| [(model.joints()[1].name.clone(), value)].into();
+    let drive =
+        [Effect::TorqueGainError(TorqueGainError { gain: on(1.2) }), Effect::TorqueBias(TorqueBias { bias: on(-6.0) })];
+    let limited = [drive.to_vec(), vec![Effect::TorqueSaturation(TorqueSaturation { limit: on(30.0) })]].concat();
+    let residual = |effects: &[Effect]| samples.residual(&mut Plant::new(&model, effects, DT).unwrap())[1].clone();
+    let (free, cut) = (residual(&drive), residual(&limited));
+
+    let drives = Plant::new(&model, &drive, DT).unwrap().drives();
+    let motion = Motion { drives: &drives, ..samples.motion(&model) };
+    let candidate = Candidate { shape: 30.0, ..Candidate::new(Kind::TorqueSaturation, vec![1]) };
+    let column = &candidate.columns(&motion)[0].rows[0].1;
+    assert!(column.iter().any(|x| *x > 1.0) && column.iter().any(|x| *x < -1.0), "{column:?}");
+    for ((free, cut), beyond) in free.iter().zip(&cut).zip(column) {
+        assert!((free - cut - beyond).abs() < 1e-9, "{free} {cut} {beyond}");
     }
 }

@@ -27,6 +27,30 @@ fn bad_input_ends_with_1_and_wrong_usage_with_2() {
 }
 
 #[test]
+fn a_drive_that_was_not_logged_is_said_and_the_other_joint_keeps_its_answer() {
+    let dir = pendulum();
+    let folder = dir.path();
+    let log = std::fs::read_to_string(folder.join("log.csv")).unwrap();
+    let mut lines = log.lines();
+    let header = lines.next().unwrap();
+    let effort = header.split(',').position(|name| name.starts_with("effort.")).unwrap();
+    let silent = |line: &str| {
+        let cells = line.split(',').enumerate().map(|(i, cell)| if i == effort { "0" } else { cell });
+        cells.collect::<Vec<_>>().join(",")
+    };
+    let rows: Vec<String> = std::iter::once(header.to_owned()).chain(lines.map(silent)).collect();
+    std::fs::write(folder.join("silent.csv"), rows.join("\n") + "\n").unwrap();
+    ends(&gapscope(folder, "diagnose robot.urdf silent.csv --out found".split(' ')), 0, "no effort of it was logged");
+    let text = std::fs::read_to_string(folder.join("found/diagnosis.json")).unwrap();
+    let diagnosis: Value = serde_json::from_str(&text).unwrap();
+    let effects = diagnosis["effects"].as_array().unwrap();
+    let other = header.split(',').filter_map(|name| name.strip_prefix("effort.")).nth(1).unwrap();
+    assert_eq!(effects.len(), 1, "{effects:?}");
+    assert_eq!(effects[0]["kind"], "viscous_friction");
+    assert_eq!(effects[0]["joints"], serde_json::json!([other]));
+}
+
+#[test]
 fn a_result_is_kept_unless_forced_and_predictions_give_the_figures() {
     let dir = pendulum();
     let folder = dir.path();

@@ -185,6 +185,10 @@ fn ratio(band: &Band, part: &[f64], gap: &[f64]) -> Option<(f64, [f64; 2])> {
         blocks[row.block][1] += gap[i] * gap[i];
     }
     blocks.retain(|b| b[1] > 0.0);
+    // A joint without any gap, or logs without a row, have no regime in which it could lie.
+    if blocks.is_empty() {
+        return None;
+    }
     let of = |sums: &[f64]| (sums[1] > 0.0).then(|| (sums[0] / sums[1]).clamp(0.0, 1.0));
     Some((of(&total(&blocks))?, interval(&blocks, of)?))
 }

@@ -18,16 +18,13 @@ impl Known {
             // A push is known by when it comes, and that is found later.
             c.shape == 0.0 && !c.has_knob() && !c.reads_torque() && c.kind != Kind::ExternalContact
         };
-        let all = Candidate::all(model);
-        let candidates = all.into_iter().filter(|c| stays(c) && c.joints.iter().all(|&j| moving[j]));
-        let candidates: Vec<Candidate> = candidates.collect();
-        Known(
-            candidates
-                .into_par_iter()
-                .map(|c| (at_rows(model, signals, band, standstill, &c), c))
-                .map(|(columns, c)| (c, columns))
-                .collect(),
-        )
+        let mut candidates = Candidate::all(model);
+        candidates.retain(|c| stays(c) && c.joints.iter().all(|&j| moving[j]));
+        let filtered = |c: Candidate| {
+            let columns = at_rows(model, signals, band, standstill, &c);
+            (c, columns)
+        };
+        Known(candidates.into_par_iter().map(filtered).collect())
     }
 
     /// The columns of a term at the rows of the band, where they are known.

@@ -11,7 +11,7 @@ const SHORTEST: f64 = 5e-5;
 /// Greatest angle that the fastest spring turns through in a step, rad: MuJoCo's springs are explicit and stable up to 2.
 const TURN: f64 = 0.3;
 /// How far bristles bend at rest under friction that has none in our law, rad (m). A joint turns through twice as much before
-/// its friction is that of the other direction; ten times more loses .04 of the shrink (`tests/export/prove.py`).
+/// its friction is that of the other direction: what that costs is in the table of `tests/export/prove.py`.
 pub const BRISTLE: f64 = 1e-4;
 /// Damping ratio of a joint that rests on such bristles.
 pub const BRISTLE_DAMPING: f64 = 0.3;

@@ -50,6 +50,7 @@ pub struct Band {
     /// Number of blocks.
     pub blocks: usize,
     kernels: Vec<Kernel>,
+    spacing: Vec<f64>,
 }
 
 impl Band {
@@ -71,7 +72,15 @@ impl Band {
         let total: f64 = signals.iter().map(|s| s.len() as f64 * s.dt).sum();
         let block_length = (total / BLOCKS).clamp(BLOCK.0, BLOCK.1);
         let folds = (signals.len() * parts).min(FOLDS_AT_MOST);
-        let mut band = Band { cutoff, rows: Vec::new(), of_episode: Vec::new(), folds, blocks: 0, kernels: Vec::new() };
+        let mut band = Band {
+            cutoff,
+            rows: Vec::new(),
+            of_episode: Vec::new(),
+            folds,
+            blocks: 0,
+            kernels: Vec::new(),
+            spacing: Vec::new(),
+        };
         for (episode, s) in signals.iter().enumerate() {
             let kernel = Kernel::low_pass(cutoff, s.dt);
             let begin = band.rows.len();
@@ -97,8 +106,14 @@ impl Band {
             band.blocks += parts * per_part;
             band.of_episode.push(begin..band.rows.len());
             band.kernels.push(kernel);
+            band.spacing.push(step as f64 * s.dt);
         }
         band
+    }
+
+    /// Time from one row to the next in each episode, s.
+    pub fn spacing(&self) -> &[f64] {
+        &self.spacing
     }
 
     /// A signal of one episode at its rows.

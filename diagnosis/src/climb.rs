@@ -222,13 +222,20 @@ impl<'a> Competition<'a> {
         let mut wide = false;
         for _ in 0..MOVES {
             let next = if wide { self.far(&here, forbidden) } else { self.near(&here, forbidden) };
-            match next {
-                Some((nats, set)) if nats > here.nats + RISE => {
-                    here = self.account(set, &here.score)?;
+            // A move may lose at its own noise what it gains at this one, or come to nothing there: then the next one.
+            let rises = |nats: f64| nats > here.nats + RISE;
+            let better = next
+                .into_iter()
+                .take_while(|(nats, _)| rises(*nats))
+                .take(SHORTLIST)
+                .find_map(|(_, set)| self.account(set, &here.score).filter(|account| rises(account.nats)));
+            match better {
+                Some(better) => {
+                    here = better;
                     wide = false;
                 }
-                _ if wide => break,
-                _ => wide = true,
+                None if wide => break,
+                None => wide = true,
             }
         }
         Some(here)
@@ -246,10 +253,10 @@ impl<'a> Competition<'a> {
         set.iter().copied().filter(|&c| !gone(c)).collect()
     }
 
-    /// The best set with one candidate more or less.
-    fn near(&self, here: &Account<'a>, forbidden: &[Kind]) -> Option<(f64, Vec<usize>)> {
+    /// Sets with one candidate more or less, best first.
+    fn near(&self, here: &Account<'a>, forbidden: &[Kind]) -> Vec<(f64, Vec<usize>)> {
         let score = &here.score;
-        let solved = score.solve(&self.problem.columns(&here.set))?;
+        let Some(solved) = score.solve(&self.problem.columns(&here.set)) else { return Vec::new() };
         let own: Vec<Range<usize>> = here.set.iter().map(|&c| self.columns[c].clone()).collect();
         let mut moves: Vec<(f64, Vec<usize>)> = score
             .losses(&solved, &own)
@@ -264,7 +271,7 @@ impl<'a> Competition<'a> {
         moves.retain(|(nats, _)| *nats > here.nats);
         moves.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
         moves.truncate(SHORTLIST);
-        self.best_of(score, moves.into_iter().map(|(_, set)| set).collect())
+        self.ranked(score, moves.into_iter().map(|(_, set)| set).collect())
     }
 
     /// What may come into a set, best of each kind first, with the score by a first look.
@@ -300,8 +307,8 @@ impl<'a> Competition<'a> {
             .collect()
     }
 
-    /// The best set with a kind more at all its places, or a kind or a candidate beyond calibration less or exchanged.
-    fn far(&self, here: &Account<'a>, forbidden: &[Kind]) -> Option<(f64, Vec<usize>)> {
+    /// Sets with a kind more at all its places, or a kind or a candidate beyond calibration less or exchanged, best first.
+    fn far(&self, here: &Account<'a>, forbidden: &[Kind]) -> Vec<(f64, Vec<usize>)> {
         let (set, score) = (&here.set, &here.score);
         let mut moves: Vec<Vec<usize>> = Vec::new();
         let all: Vec<usize> = (0..self.columns.len()).collect();
@@ -337,14 +344,17 @@ impl<'a> Competition<'a> {
         }
         moves.sort();
         moves.dedup();
-        self.best_of(score, moves)
+        self.ranked(score, moves)
     }
 
-    /// The best of some sets at a noise.
-    fn best_of(&self, score: &Score<'a>, sets: Vec<Vec<usize>>) -> Option<(f64, Vec<usize>)> {
-        sets.into_par_iter()
+    /// Some sets with their scores at a noise, best first.
+    fn ranked(&self, score: &Score<'a>, sets: Vec<Vec<usize>>) -> Vec<(f64, Vec<usize>)> {
+        let mut ranked: Vec<(f64, Vec<usize>)> = sets
+            .into_par_iter()
             .filter_map(|set| Some((score.solve(&self.problem.columns(&set))?.nats + self.prior(&set), set)))
-            .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(&a.1)))
+            .collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+        ranked
     }
 }
 

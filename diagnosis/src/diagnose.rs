@@ -11,6 +11,7 @@ use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
 use crate::horizon::{self, Errors};
 use crate::learner;
+use crate::noise::PART_OF_NOISE;
 use crate::power;
 use crate::problem::{Known, Problem, Term};
 use crate::refine::Data;
@@ -122,10 +123,10 @@ pub(crate) fn signals(model: &Model, episodes: &[Episode], findings: &mut Vec<St
     all.into_iter().flatten().collect()
 }
 
-/// The logs behind some signals with their noise once more, see [`Signals::noisier`].
+/// The logs behind some signals with a part of their noise once more, see [`Signals::noisier`].
 fn noisier(model: &Model, episodes: &[Episode], signals: &[Signals]) -> Vec<Signals> {
     let of = |s: &Signals| episodes.iter().find(|episode| episode.name == s.name);
-    let noisier = |(seed, s): (usize, &Signals)| s.noisier(model, of(s)?, seed as u64);
+    let noisier = |(seed, s): (usize, &Signals)| s.noisier(model, of(s)?, PART_OF_NOISE, seed as u64);
     signals.par_iter().enumerate().filter_map(noisier).collect()
 }
 
@@ -161,7 +162,7 @@ fn moving(signals: &[Signals], still: &[f64], model: &Model, findings: &mut Vec<
 pub(crate) struct Logs<'a> {
     pub model: &'a Model,
     pub signals: Vec<Signals>,
-    /// The same logs with their noise once more.
+    /// The same logs with a part of the noise of their positions once more.
     pub noisier: Vec<Signals>,
     pub band: Band,
     pub still: Vec<f64>,

@@ -65,6 +65,10 @@ const STIFFEST: f64 = 20.0;
 const LIGHTEST: f64 = 0.05;
 /// So many blocks of time must show something at all: a joint that its load holds on one side may cross its play once or twice.
 const LEAST_TELLING: usize = 2;
+/// Standard errors of a gap up to which it may be none: half of a 95 % interval.
+const NO_PLAY: f64 = 1.96;
+/// Gap, rad or m, that a drive would be mended for before anybody logged it.
+const WIDEST: f64 = 0.15;
 const SEED: u64 = 5;
 
 /// An account of one joint's drive that leaves less than a rigid one.
@@ -82,6 +86,8 @@ struct Study<'a> {
     joint: usize,
     runs: Vec<&'a JointRun>,
     noisier: Vec<JointRun>,
+    /// Samples of each episode at which the joint slides: at rest friction holds what nobody knows.
+    slides: Vec<Vec<bool>>,
     /// Inertia of the robot about the joint, kg m² (kg).
     inertia: f64,
     /// Rotor with which a rigid drive leaves least, kg m² (kg).
@@ -165,6 +171,7 @@ impl<'a> Study<'a> {
             joint,
             runs,
             noisier: Vec::new(),
+            slides: logs.signals.iter().map(|s| s.slides(joint, logs.still[joint])).collect(),
             inertia,
             rotor: 0.0,
             unnoticed: 0.0,
@@ -239,6 +246,11 @@ impl<'a> Study<'a> {
                 // Its own filter is another now.
                 let (drive, rotor) = if self.through { self.turn(drive, rotor) } else { (drive, rotor) };
                 let measure = self.measure(&drive, rotor);
+                // Play that may be none is another account's, and so is a gap that no gear has.
+                let play = NO_PLAY * self.error(&drive, rotor)..WIDEST;
+                if kind == Kind::Backlash && !play.contains(&drive.shape) {
+                    continue;
+                }
                 if best.as_ref().is_none_or(|(least, ..)| measure < *least) {
                     best = Some((measure, drive, rotor));
                 }
@@ -317,7 +329,10 @@ impl<'a> Study<'a> {
         for (e, run) in runs.iter().enumerate().filter(|(e, _)| view.episode.is_none_or(|only| only == *e)) {
             let run: &JointRun = run.borrow();
             let seen = smooth(torque(run), view.smooth, run.dt);
-            rows[self.logs.band.of_episode[e].clone()].copy_from_slice(&self.logs.band.filter(e, &seen));
+            let at_rows = self.logs.band.filter_where(e, &self.slides[e], &seen);
+            for (row, seen) in rows[self.logs.band.of_episode[e].clone()].iter_mut().zip(at_rows) {
+                *row = seen.unwrap_or(0.0);
+            }
         }
         rows
     }

@@ -25,6 +25,7 @@ mod kernel;
 mod late;
 mod learner;
 mod limits;
+mod noise;
 mod power;
 mod problem;
 mod refine;

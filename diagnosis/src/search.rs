@@ -5,7 +5,6 @@ use crate::corrected::residual;
 use crate::diagnose::{Logs, Progress};
 use crate::estimate::Fit;
 use crate::floor::noise_floor;
-use crate::gap;
 use crate::problem::{AT_REST, Entry, Problem, Term};
 use crate::refine::Data;
 use crate::screen;
@@ -22,11 +21,14 @@ const AGAIN: usize = 2;
 /// have been chosen because of it.
 const DOUBTFUL: f64 = 60.0;
 /// Nats that a spring or play must bring beside its rotor: as rare as any kind, on either side of the gear, a knob that the
-/// logs know to a twentieth of its range, and what the best of some hundred tries finds in noise.
-const TURNS: f64 = 3.0 + 0.7 + 3.0 + 9.0;
+/// logs know to a twentieth of its range, and what the best of some hundred tries finds in noise that is brought to one level
+/// by a tenth or so.
+const TURNS: f64 = 3.0 + 0.7 + 3.0 + 24.0;
 
 /// What joints bear at rest beyond friction: `[joint][row]`, N m or N.
 type Borne = Vec<Vec<Option<f64>>>;
+/// What an account leaves: `[episode][joint][signal]`, N m or N.
+pub(crate) type Rest = Vec<Vec<Vec<f64>>>;
 
 /// What the search came to.
 pub(crate) struct Chosen {
@@ -64,29 +66,28 @@ pub(crate) struct Turned {
 impl Chosen {
     /// By how many nats this account of the logs is likelier than another, each at its exact law.
     pub fn odds_against(&self, other: &Chosen, logs: &Logs<'_>) -> Result<f64, EffectError> {
+        let (own, others) = (logs.rest(self)?, logs.rest(other)?);
+        let filtered =
+            (self.filters_beyond(other) || other.filters_beyond(self)) && logs.noisier.len() == logs.signals.len();
+        let equalizers = filtered.then(|| logs.at_one_noise([(self, &own), (other, &others)])).transpose()?;
+        let at = |i: usize| equalizers.as_ref().map(|both| &both[i]);
+        let correlation = |of: &Chosen, i: usize| of.exact.correlation_of(&of.fit, at(i), &logs.band);
         // What is left of the better account is nearer to noise: it says how many rows count as one.
         let counts: Vec<f64> =
-            self.exact.correlation().iter().zip(other.exact.correlation()).map(|(a, b)| a.min(*b)).collect();
-        let (own, own_borne) = logs.noise_through(self)?;
-        let (others, others_borne) = logs.noise_through(other)?;
-        let evidence = |chosen: &Chosen| chosen.exact.evidence(&chosen.fit, &counts, &logs.band);
-        let (mut evidence, mut others_evidence) = (evidence(self), evidence(other));
+            correlation(self, 0).into_iter().zip(correlation(other, 1)).map(|(a, b)| a.min(b)).collect();
+        let evidence = |of: &Chosen, i: usize| of.exact.evidence(&of.fit, at(i), &counts, &logs.band);
+        let (mut evidence, mut others_evidence) = (evidence(self, 0), evidence(other, 1));
         let least: Vec<f64> =
             evidence.noise.iter().zip(&others_evidence.noise).map(|(own, other)| own.min(*other)).collect();
-        evidence.at_rest(&own_borne, &least, &counts, &logs.band);
-        others_evidence.at_rest(&others_borne, &least, &counts, &logs.band);
-        // A law that filters what was measured makes more or less of its noise, and leaves more or less for that alone. One with
-        // blows makes anything of it.
-        let differ = |a: &Chosen, b: &Chosen| {
-            let has = |e: &Entry| b.exact.entries.iter().any(|other| other.candidate == e.candidate);
-            a.exact.entries.iter().any(|e| e.candidate.filters() && !has(e))
-        };
-        let filtered = (differ(self, other) || differ(other, self)) && !self.blows() && !other.blows();
-        let quieter: f64 = (0..own.len())
-            .filter(|&j| filtered && own[j] > 0.0 && others[j] > 0.0)
-            .map(|j| self.exact.rows(j) / counts[j] * (others[j] / own[j]).ln())
-            .sum();
-        Ok(evidence.against(&others_evidence, quieter) + self.prior() - other.prior())
+        evidence.at_rest(&logs.borne(&own), &least, &counts, &logs.band);
+        others_evidence.at_rest(&logs.borne(&others), &least, &counts, &logs.band);
+        Ok(evidence.against(&others_evidence) + self.prior() - other.prior())
+    }
+
+    /// Whether a law in it filters what was measured and is not in another.
+    pub(crate) fn filters_beyond(&self, other: &Chosen) -> bool {
+        let has = |e: &Entry| other.exact.entries.iter().any(|other| other.candidate == e.candidate);
+        self.exact.entries.iter().any(|e| e.candidate.filters() && !has(e))
     }
 
     /// Log probability of the account before any log is seen.
@@ -110,37 +111,24 @@ impl Chosen {
         }
     }
 
-    /// Whether a drive in it hits a stop, from which noise comes back as blows.
-    fn blows(&self) -> bool {
-        self.exact.entries.iter().any(|e| e.candidate.blows())
-    }
-
     fn turns(&self) -> bool {
         self.exact.entries.iter().any(|e| e.candidate.turns())
     }
 }
 
 impl Logs<'_> {
-    /// Root mean square of what the noise of the logs makes of the rows of each joint behind an account, N m or N, and what
-    /// joints bear at rest beyond its friction.
-    fn noise_through(&self, chosen: &Chosen) -> Result<(Vec<f64>, Borne), EffectError> {
-        let rest = |signals: &[Signals]| Data { signals, ..self.data(&chosen.noise) }.rest(&chosen.exact, &chosen.fit);
-        let plain = rest(&self.signals)?;
-        let borne = (0..self.model.dof()).map(|j| self.at_rest(j, &plain)).collect();
-        if self.noisier.len() != self.signals.len() {
-            return Ok((vec![0.0; self.model.dof()], borne));
-        }
-        let rows = |rest: &[Vec<Vec<f64>>]| gap::at_rows(&self.band, rest, self.model.dof());
-        let size = |(a, b): (&Vec<f64>, &Vec<f64>)| {
-            let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
-            (square / a.len().max(1) as f64).sqrt()
-        };
-        let (plain, noisier) = (rows(&plain), rows(&rest(&self.noisier)?));
-        Ok((plain.iter().zip(&noisier).map(size).collect(), borne))
+    /// What an account leaves of every run.
+    fn rest(&self, chosen: &Chosen) -> Result<Rest, EffectError> {
+        self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)
+    }
+
+    /// What joints bear at rest beyond friction.
+    fn borne(&self, rest: &Rest) -> Borne {
+        (0..self.model.dof()).map(|j| self.at_rest(j, rest)).collect()
     }
 
     /// What is left of a joint at the rows at which it rests, N m or N.
-    fn at_rest(&self, joint: usize, rest: &[Vec<Vec<f64>>]) -> Vec<Option<f64>> {
+    fn at_rest(&self, joint: usize, rest: &Rest) -> Vec<Option<f64>> {
         let rows = self.signals.iter().zip(rest).enumerate().flat_map(|(e, (s, rest))| {
             let still: Vec<bool> = s.v[joint].iter().map(|v| v.abs() < self.still[joint]).collect();
             self.band.filter_where(e, &still, &rest[joint])

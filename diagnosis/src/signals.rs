@@ -137,16 +137,12 @@ impl Signals {
         Some(signals)
     }
 
-    /// Signals of the same run with white noise of the size that its own noise has on position and effort once more.
-    pub fn noisier(&self, model: &Model, episode: &Episode, seed: u64) -> Option<Signals> {
+    /// Signals of the same run with a part of the noise that its position has once more, white.
+    pub fn noisier(&self, model: &Model, episode: &Episode, part: f64, seed: u64) -> Option<Signals> {
         let mut random = Pcg64::seed_from_u64(seed);
         let mut episode = episode.without_glitches();
-        for (channel, sizes) in
-            [(&mut episode.position, &self.position_noise), (&mut episode.effort, &self.effort_noise)]
-        {
-            for (x, size) in channel.iter_mut().zip(sizes) {
-                x.iter_mut().for_each(|x| *x += size * random.sample::<f64, _>(StandardNormal));
-            }
+        for (x, size) in episode.position.iter_mut().zip(&self.position_noise) {
+            x.iter_mut().for_each(|x| *x += part * size * random.sample::<f64, _>(StandardNormal));
         }
         let signals = Signals::new(model, &episode)?;
         Some(Signals { pushed: self.pushed.clone(), ..signals })
@@ -164,7 +160,8 @@ impl Signals {
     pub fn slides(&self, joint: usize, standstill: f64) -> Vec<bool> {
         let stands: Vec<bool> = self.v[joint].iter().map(|v| v.abs() < standstill).collect();
         let wide = (self.held.len() as f64 / 2.0 - 1.0) * self.raw.dt - DERIVATIVE_HALF_WIDTH;
-        let reach = (wide / self.dt).round().max(0.0) as usize;
+        // The sample beside a rest shares its differences with it.
+        let reach = (wide / self.dt).round().max(1.0) as usize;
         let near = |k: usize| stands[k.saturating_sub(reach)..(k + reach + 1).min(stands.len())].iter().any(|s| *s);
         (0..stands.len()).map(|k| !near(k)).collect()
     }
@@ -234,8 +231,13 @@ impl Signals {
             Signals::gather(&self.a, k, &mut a);
             model.inverse_dynamics(&mut data, &q, &v, &a, &mut tau);
             for (j, joint) in model.joints().iter().enumerate() {
-                self.nominal[j].push(tau[j] + joint.damping * v[j] + joint.friction * v[j].signum());
+                self.nominal[j].push(tau[j] + joint.damping * v[j]);
             }
+        }
+        for (j, joint) in model.joints().iter().enumerate().filter(|(_, joint)| joint.friction != 0.0) {
+            let sign: Vec<f64> = self.v[j].iter().map(|v| v.signum()).collect();
+            let smeared = self.motion(model, &[]).smeared(&sign, &self.v[j]);
+            self.nominal[j].iter_mut().zip(smeared).for_each(|(nominal, sign)| *nominal += joint.friction * sign);
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Operators on signals of a uniform grid that carry memory from sample to sample.
 
+use std::f64::consts::PI;
+
 /// A signal `delay` s later, linear between samples; what lies before the first sample is taken as the first.
 pub(crate) fn late(x: &[f64], delay: f64, dt: f64) -> Vec<f64> {
     let steps = (delay / dt).max(0.0);
@@ -44,6 +46,16 @@ pub(crate) fn second_derivative(x: &[f64], dt: f64) -> Vec<f64> {
 /// First derivative by central differences; at the ends that of the neighbour.
 pub(crate) fn first_derivative(x: &[f64], dt: f64) -> Vec<f64> {
     differences(x, |before, _, after| (after - before) / (2.0 * dt))
+}
+
+/// A signal through a zero-phase window cos⁴ of some half-width, s; at the ends what lies beyond is taken as the last sample.
+pub(crate) fn smoothed(x: &[f64], half_width: f64, dt: f64) -> Vec<f64> {
+    let reach = (half_width / dt) as usize;
+    let weight = |i: usize| (0.5 * PI * (i as f64 - reach as f64) * dt / half_width).cos().powi(4);
+    let weights: Vec<f64> = (0..=2 * reach).map(weight).collect();
+    let sum: f64 = weights.iter().sum();
+    let at = |k: usize| x[k.saturating_sub(reach).min(x.len() - 1)];
+    (0..x.len()).map(|k| weights.iter().enumerate().map(|(i, w)| w * at(k + i)).sum::<f64>() / sum).collect()
 }
 
 fn differences(x: &[f64], of: impl Fn(f64, f64, f64) -> f64) -> Vec<f64> {

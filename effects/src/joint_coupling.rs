@@ -72,8 +72,9 @@ pub(crate) fn signature(motion: &Motion, [a, b]: [usize; 2], ratio: f64) -> Vec<
     let sum = |x: &[Vec<f64>]| -> Vec<f64> { x[a].iter().zip(&x[b]).map(|(xa, xb)| xa + ratio * xb).collect() };
     let speed = sum(motion.v);
     let standstill = motion.standstill[a] + ratio.abs() * motion.standstill[b];
-    let sign = speed.iter().map(|&s| soft_sign(s, standstill)).collect();
-    [speed.clone(), sign, sum(motion.a)]
+    let sign: Vec<f64> = speed.iter().map(|&s| soft_sign(s, standstill)).collect();
+    let smeared = motion.smeared(&sign, &speed);
+    [speed, smeared, sum(motion.a)]
         .into_iter()
         .map(|force| {
             let on_b = force.iter().map(|f| ratio * f).collect();

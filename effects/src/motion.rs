@@ -55,6 +55,24 @@ pub struct Held<'a> {
     pub weights: &'a [f64],
 }
 
+impl Held<'_> {
+    /// Weights of the kernel on the grid of the signals, about its middle: each held sample goes to the two signals about it.
+    fn on_signals(&self) -> Vec<f64> {
+        let middle = 0.5 * (self.weights.len() as f64 - 1.0);
+        let reach = (middle / self.stride as f64).ceil() as usize;
+        let mut weights = vec![0.0; 2 * reach + 1];
+        for (i, weight) in self.weights.iter().enumerate() {
+            let place = (i as f64 - middle) / self.stride as f64 + reach as f64;
+            let (before, part) = (place.floor() as usize, place.fract());
+            weights[before] += (1.0 - part) * weight;
+            if part > 0.0 {
+                weights[before + 1] += part * weight;
+            }
+        }
+        weights
+    }
+}
+
 impl Motion<'_> {
     /// What a limit takes off the effort gain · τ + bias of a joint, smoothed like [`Motion::tau`]: a limit acts on every
     /// sample, and the mean of what is cut is not the cut of the mean.
@@ -71,6 +89,23 @@ impl Motion<'_> {
                 held.weights.iter().zip(from).map(|(w, x)| w * x).sum()
             })
             .collect()
+    }
+
+    /// A force that jumps as a speed changes sign, sample by sample, smoothed like [`Motion::tau`]: what moves the robot
+    /// jumps, and what is left of smoothed signals about a jump would be no error of the law.
+    pub fn smeared(&self, force: &[f64], speed: &[f64]) -> Vec<f64> {
+        let Some(held) = &self.held else { return force.to_vec() };
+        let weights = held.on_signals();
+        // The mean over each sample's share of time: it jumps where the speed, linear between samples, is zero.
+        let mut force = force.to_vec();
+        for k in (1..force.len()).filter(|&k| speed[k - 1] * speed[k] < 0.0) {
+            let jump = force[k] - force[k - 1];
+            let early = 0.5 - speed[k - 1] / (speed[k - 1] - speed[k]);
+            force[if early > 0.0 { k - 1 } else { k }] += early * jump;
+        }
+        let reach = weights.len() / 2;
+        let at = |k: usize| force[k.saturating_sub(reach).min(force.len() - 1)];
+        (0..force.len()).map(|k| weights.iter().enumerate().map(|(i, w)| w * at(k + i)).sum()).collect()
     }
 
     /// Number of samples.
@@ -106,7 +141,41 @@ pub fn soft_sign(speed: f64, standstill: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::mean_size;
+    use super::{Held, Motion, mean_size};
+
+    #[test]
+    fn a_jump_is_smeared_about_where_the_speed_is_zero() {
+        let model = gapscope_dynamics::robots::model("double_pendulum").unwrap().unwrap().model;
+        let speed: Vec<f64> = (0..40).map(|k| f64::from(k) - 20.3).collect();
+        let force: Vec<f64> = speed.iter().map(|v| v.signum()).collect();
+        for (weights, stride) in [(vec![0.1, 0.2, 0.2, 0.2, 0.2, 0.1], 1), (vec![0.125; 8], 2), (vec![0.05; 20], 3)] {
+            let held = Held { effort: &[], first: 0, stride, weights: &weights };
+            let motion = Motion {
+                model: &model,
+                q: &[],
+                v: &[],
+                a: &[],
+                tau: &[],
+                nominal: &[],
+                load: &[],
+                taken: &[],
+                drives: &[],
+                effort_noise: &[],
+                held: Some(held),
+                dt: 1e-3,
+                start: 0.0,
+                pushed: &[],
+                standstill: &[],
+            };
+            let smeared = motion.smeared(&force, &speed);
+            assert!((smeared[5] + 1.0).abs() < 1e-12 && (smeared[35] - 1.0).abs() < 1e-12);
+            assert!(smeared.windows(2).all(|pair| pair[0] <= pair[1] + 1e-12), "no jump, no ringing");
+            // The integral of the sign over the 40 shares of time, −0.5 to 39.5.
+            let sum: f64 = smeared.iter().sum();
+            assert!((sum - ((39.5 - 20.3) - (20.3 + 0.5))).abs() < 1e-9, "{sum}");
+            assert_eq!(Motion { held: None, ..motion }.smeared(&force, &speed), force);
+        }
+    }
 
     #[test]
     fn the_mean_size_is_that_of_a_torque_with_gaussian_noise() {

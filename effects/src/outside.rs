@@ -71,7 +71,8 @@ pub(crate) fn joint_drag(motion: &Motion, joint: usize, power: f64) -> Vec<Colum
 /// Dry friction at one place of a joint's travel, f Λ(q) sign q̇. Coefficient: f, N m (N).
 pub(crate) fn rub(motion: &Motion, joint: usize, place: f64) -> Vec<Column> {
     let rub = |(q, v): (&f64, &f64)| near(*q, place) * soft_sign(*v, motion.standstill[joint]);
-    vec![Column::on(joint, motion.q[joint].iter().zip(&motion.v[joint]).map(rub).collect(), 0.0)]
+    let force: Vec<f64> = motion.q[joint].iter().zip(&motion.v[joint]).map(rub).collect();
+    vec![Column::on(joint, motion.smeared(&force, &motion.v[joint]), 0.0)]
 }
 
 /// Torque at one place of a joint's travel, −t Λ(q): a cable, a stop. Coefficient: t, N m (N).

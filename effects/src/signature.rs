@@ -187,11 +187,6 @@ impl Candidate {
         self.turns() || effort.contains(&self.kind)
     }
 
-    /// Whether it hits stops: noise of the motion comes back as blows, early or late.
-    pub fn blows(&self) -> bool {
-        self.kind == Kind::Backlash
-    }
-
     /// Ripples of one joint on a grid of cycles, fine enough that none falls between.
     pub fn ripples(joint: usize, range: &Range) -> Vec<Candidate> {
         let turn = TAU / range.span;

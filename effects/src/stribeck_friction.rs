@@ -59,6 +59,6 @@ impl Law for StribeckFriction {
 pub(crate) fn signature(motion: &Motion, joint: usize, velocity: f64) -> Vec<Column> {
     let standstill = motion.standstill[joint];
     let sign: Vec<f64> = motion.v[joint].iter().map(|&v| soft_sign(v, standstill)).collect();
-    let rise = sign.iter().zip(&motion.v[joint]).map(|(s, v)| s * (-(v / velocity).powi(2)).exp()).collect();
-    vec![Column::on(joint, sign, 0.0), Column::on(joint, rise, 0.0)]
+    let rise: Vec<f64> = sign.iter().zip(&motion.v[joint]).map(|(s, v)| s * (-(v / velocity).powi(2)).exp()).collect();
+    [sign, rise].into_iter().map(|force| Column::on(joint, motion.smeared(&force, &motion.v[joint]), 0.0)).collect()
 }

@@ -1,6 +1,6 @@
 //! How far a motor turns ahead of its link along a measured run.
 
-use crate::filter::{first_derivative, first_order, second_derivative};
+use crate::filter::{first_derivative, first_order, second_derivative, smoothed};
 use crate::plant::CONTACT;
 use crate::{Candidate, EncoderSide, Kind, Motion};
 use gapscope_dynamics::{Data, Model};
@@ -27,6 +27,13 @@ const LET_GO_FOR: f64 = 0.02;
 const SETTLED: f64 = 0.01;
 /// What another start must leave of what play at rest does: a gap that is not quite right is no other start.
 const BEYOND_DOUBT: f64 = 0.25;
+
+/// Half-width of the window that a spring's angle goes through before it is differentiated, s; about 18 Hz. Faster than that no
+/// spring of a robot winds up, and noise would leak past where a joint rests.
+const WIND_UP: f64 = 0.025;
+
+/// Samples over which the rate of a spring is told as friction begins to hold its link.
+const SLOPE_OVER: usize = 4;
 
 /// A coupling that is so soft, under a link that falls, that it runs away begins anew from here, rad (m).
 const LET_GO: f64 = 100.0;
@@ -103,7 +110,22 @@ pub(crate) struct WindUp {
     pub acceleration: Vec<f64>,
 }
 
-/// An inertia on a coupling along a run: I δ̈ = drive − slope δ − τ_l(δ, δ̇).
+/// Friction of a joint along a run, which opposes the link's own speed: behind its motor another than the logged one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Drag {
+    /// Logged speed of the joint, sample by sample, rad/s (m/s).
+    pub speed: Vec<f64>,
+    /// Greatest dry friction, sample by sample, N m (N).
+    pub dry: Vec<f64>,
+    /// Viscous friction, N m s/rad (N s/m).
+    pub viscous: f64,
+    /// What friction takes at the logged speed, sample by sample, N m (N).
+    pub taken: Vec<f64>,
+    /// Samples at which the joint rests and its friction holds what nobody knows.
+    pub holds: Vec<bool>,
+}
+
+/// An inertia on a coupling along a run: I δ̈ = drive + f(q̇_m − δ̇) − slope δ − τ_l(δ, δ̇).
 ///
 /// Where the motor's motion is logged, I is the link's inertia and `drive` the torque that the link would take if it went with
 /// its motor; where the link's is, I is the rotor's and `drive` the effort less what the rotor takes to go with its link.
@@ -116,6 +138,8 @@ pub(crate) struct Oscillator<'a> {
     pub inertia: &'a [f64],
     /// How fast the drive falls as the angle grows, N m/rad, sample by sample: a link that sags has another weight.
     pub slope: Option<&'a [f64]>,
+    /// Friction f of the link, where its motor's motion is logged; `drive` is without it.
+    pub drag: Option<&'a Drag>,
     /// What joins the two.
     pub coupling: Coupling,
     /// Time from one sample to the next, s.
@@ -133,6 +157,29 @@ impl Oscillator<'_> {
         let first = self.drive.first().copied().unwrap_or(0.0);
         let at_rest = (first / self.coupling.stiffness + self.coupling.half_gap * first.signum(), 0.0);
         self.from(seen.and_then(|seen| self.start(seen, at_rest)).unwrap_or(at_rest), seen)
+    }
+
+    /// Puts the angle of a run left to itself where it is not known, from the angle and rate before to the angle behind.
+    fn bridge(&self, angle: &mut [f64], unknown: &[bool]) {
+        let mut k = 0;
+        while let Some(from) = (k..angle.len()).find(|&k| unknown[k]) {
+            let to = (from..angle.len()).find(|&k| !unknown[k]).unwrap_or(angle.len());
+            k = to;
+            let begin = from.saturating_sub(1);
+            let rate = match from.checked_sub(1 + SLOPE_OVER).filter(|first| !unknown[*first..from].contains(&true)) {
+                Some(first) => (angle[begin] - angle[first]) / (SLOPE_OVER as f64 * self.dt),
+                None => 0.0,
+            };
+            let start = if from == 0 { self.drive[0] / self.coupling.stiffness } else { angle[begin] };
+            let end = (to + 1).min(angle.len());
+            let part = Oscillator { drive: &self.drive[begin..end], inertia: &self.inertia[begin..end], ..*self };
+            let free = part.from((start, rate), None).angle;
+            // What the two ends do not agree on is spread evenly.
+            let off = if to < angle.len() { angle[to] - free[to - begin] } else { 0.0 };
+            for k in from..to {
+                angle[k] = free[k - begin] + off * (k - begin) as f64 / (to - begin) as f64;
+            }
+        }
     }
 
     /// First angle and rate of the run that comes nearest to the torque `seen` at first (least squares); nothing for what is
@@ -185,13 +232,12 @@ impl Oscillator<'_> {
 
     /// Torque through the coupling of a run left to itself from an angle and its rate, N m (N).
     fn torque_from(&self, start: (f64, f64)) -> Vec<f64> {
-        let run = self.from(start, None);
-        run.angle.iter().zip(&run.rate).map(|(&angle, &rate)| self.coupling.torque(angle, rate)).collect()
+        self.from(start, None).torque(&self.coupling)
     }
 
     /// The wind-up from an angle and its rate, semi-implicit Euler in steps of half a millisecond.
     fn from(&self, (mut angle, mut rate): (f64, f64), seen: Option<&[f64]>) -> WindUp {
-        let Oscillator { drive, inertia, slope, coupling, dt } = *self;
+        let Oscillator { drive, inertia, slope, drag, coupling, dt } = *self;
         let steps = (dt / STEP).ceil().max(1.0);
         let h = dt / steps;
         let mut out = WindUp {
@@ -199,11 +245,15 @@ impl Oscillator<'_> {
             rate: Vec::with_capacity(drive.len()),
             acceleration: Vec::with_capacity(drive.len()),
         };
+        // Friction of the last step, N m.
+        let mut friction = 0.0;
+        // Rate at which the angle is drawn to the one seen, rad/s: the link is seen to turn with it.
+        let mut drawn = 0.0;
         for (k, (&now, &inertia)) in drive.iter().zip(inertia).enumerate() {
             out.angle.push(angle);
             out.rate.push(rate);
             let slope = slope.map_or(0.0, |slope| slope[k]);
-            out.acceleration.push((now - slope * angle - coupling.torque(angle, rate)) / inertia);
+            out.acceleration.push((now + friction - slope * angle - coupling.torque(angle, rate)) / inertia);
             let next = drive.get(k + 1).copied().unwrap_or(now);
             let seen = seen.map(|s| (s[k], s.get(k + 1).copied().unwrap_or(s[k])));
             let pull = -(-h * coupling.pull(inertia)).exp_m1();
@@ -212,13 +262,25 @@ impl Oscillator<'_> {
                 let part = (i as f64 + 0.5) / steps;
                 let drive = now + (next - now) * part;
                 rate += per_torque * (drive - slope * angle - coupling.torque(angle, rate));
+                if let Some(drag) = drag {
+                    let motor = drag.speed[k];
+                    let motor = motor + (drag.speed.get(k + 1).copied().unwrap_or(motor) - motor) * part;
+                    let free = motor - drawn - rate;
+                    let wet = free / (1.0 + per_torque * drag.viscous);
+                    let hold = (per_torque * drag.dry[k]).abs();
+                    let link = wet - wet.clamp(-hold, hold);
+                    friction = (free - link) / per_torque;
+                    rate = motor - drawn - link;
+                }
                 angle += h * rate;
                 if let Some((now, next)) = seen {
-                    angle += pull * (coupling.held_by(now + (next - now) * part, angle) - angle);
+                    let off = coupling.held_by(now + (next - now) * part, angle) - angle;
+                    drawn = pull * off / h;
+                    angle += pull * off;
                 }
             }
             if !(angle.abs() < LET_GO && rate.abs() < LET_GO / h) {
-                (angle, rate) = (0.0, 0.0);
+                (angle, rate, drawn) = (0.0, 0.0, 0.0);
             }
         }
         out
@@ -227,21 +289,38 @@ impl Oscillator<'_> {
 
 impl WindUp {
     /// Of a motor along the logged motion of its link: of the torque that `turning` the motor leaves and of the one `taken`
-    /// by the link, N m (N). A spring shows its angle by the torque that goes through it; a motor in its play by how it is
-    /// driven.
-    pub fn of_motor(turning: &[f64], taken: &[f64], rotor: f64, coupling: &Coupling, dt: f64) -> WindUp {
+    /// by the link, N m (N). A spring shows its angle by the torque that goes through it; a motor in its play, or behind a
+    /// link that friction `holds`, by how it is driven.
+    pub fn of_motor(
+        turning: &[f64],
+        taken: &[f64],
+        holds: &[bool],
+        rotor: f64,
+        coupling: &Coupling,
+        dt: f64,
+    ) -> WindUp {
+        let inertia = vec![rotor; turning.len()];
+        let motor = Oscillator { drive: turning, inertia: &inertia, slope: None, drag: None, coupling: *coupling, dt };
         if coupling.half_gap > 0.0 && rotor > 0.0 {
-            let inertia = vec![rotor; turning.len()];
-            let motor = Oscillator { drive: turning, inertia: &inertia, slope: None, coupling: *coupling, dt };
             return motor.wind_up(Some(taken));
         }
-        let wound: Vec<f64> = taken.iter().map(|torque| torque / coupling.stiffness).collect();
-        WindUp::of(first_order(&wound, coupling.damping / coupling.stiffness, dt), dt)
+        let mut wound: Vec<f64> = taken.iter().map(|torque| torque / coupling.stiffness).collect();
+        wound = first_order(&wound, coupling.damping / coupling.stiffness, dt);
+        if rotor > 0.0 {
+            motor.bridge(&mut wound, holds);
+        }
+        WindUp::of(wound, dt)
+    }
+
+    /// Torque through the coupling, sample by sample, N m (N).
+    pub fn torque(&self, coupling: &Coupling) -> Vec<f64> {
+        self.angle.iter().zip(&self.rate).map(|(&angle, &rate)| coupling.torque(angle, rate)).collect()
     }
 
     /// Of an angle that is known.
     pub fn of(angle: Vec<f64>, dt: f64) -> WindUp {
-        WindUp { rate: first_derivative(&angle, dt), acceleration: second_derivative(&angle, dt), angle }
+        let smooth = smoothed(&angle, WIND_UP, dt);
+        WindUp { rate: first_derivative(&smooth, dt), acceleration: second_derivative(&smooth, dt), angle }
     }
 }
 
@@ -258,6 +337,8 @@ pub struct JointRun {
     pub inertia: Vec<f64>,
     /// How fast the torque that the robot takes about the joint grows with its angle, N m/rad (N/m).
     pub slope: Vec<f64>,
+    /// Friction of the joint.
+    pub(crate) drag: Drag,
     /// Time from one sample to the next, s.
     pub dt: f64,
 }
@@ -276,16 +357,24 @@ impl JointRun {
         };
         match drive.side {
             EncoderSide::Motor => {
-                let slope = Some(&self.slope[..]);
-                let own = Oscillator { drive: &link, inertia: &self.inertia, slope, coupling, dt: self.dt };
-                let ahead = own.wind_up(Some(&motor));
-                let taken =
-                    |k: usize| link[k] - self.slope[k] * ahead.angle[k] - self.inertia[k] * ahead.acceleration[k];
-                all.map(|k| motor[k] - taken(k)).collect()
+                let smooth: Vec<f64> = link.iter().zip(&self.drag.taken).map(|(link, drag)| link - drag).collect();
+                let own = Oscillator {
+                    drive: &smooth,
+                    inertia: &self.inertia,
+                    slope: Some(&self.slope[..]),
+                    drag: Some(&self.drag),
+                    coupling,
+                    dt: self.dt,
+                };
+                let passed = own.wind_up(Some(&motor)).torque(&coupling);
+                all.map(|k| motor[k] - passed[k]).collect()
             }
             EncoderSide::Link => {
-                let ahead = WindUp::of_motor(&motor, &link, rotor, &coupling, self.dt);
-                all.map(|k| motor[k] - rotor * ahead.acceleration[k] - link[k]).collect()
+                let ahead = WindUp::of_motor(&motor, &link, &self.drag.holds, rotor, &coupling, self.dt);
+                let passed = ahead.torque(&coupling);
+                // Where friction holds the link, what its coupling holds is what the motor passes on.
+                let taken = |k: usize| if self.drag.holds[k] { passed[k] } else { link[k] };
+                all.map(|k| motor[k] - rotor * ahead.acceleration[k] - taken(k)).collect()
             }
         }
     }
@@ -300,7 +389,7 @@ impl JointRun {
         let Some(coupling) = Coupling::of(drive) else { return vec![0.0; self.rest.len()] };
         let taken: Vec<f64> = self.delivered.iter().zip(&self.rest).map(|(effort, rest)| effort - rest).collect();
         let both: Vec<f64> = self.inertia.iter().map(|link| link * rotor / (link + rotor)).collect();
-        let free = Oscillator { drive: &taken, inertia: &both, slope: None, coupling, dt: self.dt };
+        let free = Oscillator { drive: &taken, inertia: &both, slope: None, drag: None, coupling, dt: self.dt };
         let of = |k: usize| match drive.side {
             EncoderSide::Motor => self.inertia[k],
             EncoderSide::Link => rotor,
@@ -370,7 +459,7 @@ mod tests {
     fn a_spring_that_begins_unwound_under_load_is_followed_from_the_first_sample() {
         let coupling = Coupling::resonant(0.2, 4.0, 0.05);
         let (drive, inertia) = (vec![3.0; 1000], vec![0.2; 1000]);
-        let link = Oscillator { drive: &drive, inertia: &inertia, slope: None, coupling, dt: 2e-3 };
+        let link = Oscillator { drive: &drive, inertia: &inertia, slope: None, drag: None, coupling, dt: 2e-3 };
         let truth = link.from((0.0, 0.0), None);
         let seen: Vec<f64> = (0..1000).map(|k| coupling.torque(truth.angle[k], truth.rate[k])).collect();
         let ahead = link.wind_up(Some(&seen));
@@ -381,11 +470,83 @@ mod tests {
         assert!(off(&blind, 0) > 0.9, "at rest under its load it would begin wound");
     }
 
+    /// A link of 0.2 kg m² with dry friction on a spring behind a motor that swings, in steps of a fiftieth of a millisecond.
+    #[test]
+    fn friction_opposes_the_link_and_not_the_motor_that_is_logged() {
+        let (inertia, rotor, friction, dt) = (0.2, 0.3, 1.5, 1e-3);
+        let coupling = Coupling::resonant(inertia, 4.0, crate::joint_elasticity::RATIO);
+        let omega = TAU * 0.7;
+        let motor = |t: f64| {
+            [0.6 * (omega * t).sin(), 0.6 * omega * (omega * t).cos(), -0.6 * omega.powi(2) * (omega * t).sin()]
+        };
+        let (mut q, mut v, h) = (0.0, 0.6 * omega, 2e-5);
+        let mut passed = Vec::new();
+        for k in 0..8000 {
+            for i in 0..50 {
+                let [theta, rate, _] = motor((f64::from(k) + f64::from(i) / 50.0) * dt);
+                let torque = coupling.torque(theta - q, rate - v);
+                if i == 0 {
+                    passed.push(torque);
+                }
+                let free = v + h * torque / inertia;
+                v = free - free.clamp(-h * friction / inertia, h * friction / inertia);
+                q += h * v;
+            }
+        }
+        let at = |k: usize| motor(k as f64 * dt);
+        let samples = 0..passed.len();
+        let delivered: Vec<f64> = samples.clone().map(|k| rotor * at(k)[2] + passed[k]).collect();
+        let taken: Vec<f64> = samples.clone().map(|k| friction * at(k)[1].signum()).collect();
+        let run = |friction: f64| JointRun {
+            rest: samples.clone().map(|k| delivered[k] - inertia * at(k)[2] - taken[k]).collect(),
+            delivered: delivered.clone(),
+            acceleration: samples.clone().map(|k| at(k)[2]).collect(),
+            inertia: vec![inertia; passed.len()],
+            slope: vec![0.0; passed.len()],
+            drag: Drag {
+                speed: samples.clone().map(|k| at(k)[1]).collect(),
+                dry: vec![friction; passed.len()],
+                viscous: 0.0,
+                taken: taken.iter().map(|taken| if friction > 0.0 { *taken } else { 0.0 }).collect(),
+                holds: vec![false; passed.len()],
+            },
+            dt,
+        };
+        let drive = Candidate {
+            shape: 4.0,
+            inertia,
+            side: EncoderSide::Motor,
+            ..Candidate::new(Kind::JointElasticity, vec![0])
+        };
+        let left = |run: &JointRun| {
+            let left = &run.left_by(&drive, rotor)[1000..];
+            (dot(left, left) / left.len() as f64).sqrt()
+        };
+        let (own, of_motor) = (left(&run(friction)), left(&run(0.0)));
+        assert!(own < 0.1 * friction && own < 0.6 * of_motor, "{own} and {of_motor}");
+    }
+
+    #[test]
+    fn a_spring_behind_a_link_that_friction_holds_swings_as_it_is_driven() {
+        let coupling = Coupling::resonant(0.2, 4.0, 0.05);
+        let drive: Vec<f64> = (0..1000).map(|k| 2.0 + (0.01 * f64::from(k)).sin()).collect();
+        let inertia = vec![0.3; 1000];
+        let motor = Oscillator { drive: &drive, inertia: &inertia, slope: None, drag: None, coupling, dt: 1e-3 };
+        let truth = motor.from((0.01, 0.3), None).angle;
+        let most = truth.iter().fold(0.0f64, |most, angle| most.max(angle.abs()));
+        let unknown: Vec<bool> = (0..1000).map(|k| (300..700).contains(&k)).collect();
+        let mut angle: Vec<f64> =
+            truth.iter().zip(&unknown).map(|(x, unknown)| if *unknown { 9.0 } else { *x }).collect();
+        motor.bridge(&mut angle, &unknown);
+        let off = truth.iter().zip(&angle).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 0.02 * most, "{off} of {most}");
+    }
+
     #[test]
     fn a_play_that_begins_let_go_in_its_gap_is_followed_through_its_first_blow() {
         let coupling = Coupling { half_gap: 0.01, ..Coupling::resonant(0.2, 20.0, 0.1) };
         let (drive, inertia) = (vec![3.0; 200], vec![0.2; 200]);
-        let motor = Oscillator { drive: &drive, inertia: &inertia, slope: None, coupling, dt: 2e-3 };
+        let motor = Oscillator { drive: &drive, inertia: &inertia, slope: None, drag: None, coupling, dt: 2e-3 };
         let truth = motor.torque_from((-0.0067, 0.12));
         let off = |start: (f64, f64)| -> f64 {
             motor.torque_from(start).iter().zip(&truth).map(|(torque, truth)| (torque - truth).powi(2)).sum()
@@ -408,6 +569,13 @@ mod tests {
             acceleration: vec![0.0; samples],
             inertia: vec![0.2; samples],
             slope: vec![0.0; samples],
+            drag: Drag {
+                speed: vec![0.0; samples],
+                dry: vec![0.0; samples],
+                viscous: 0.0,
+                taken: vec![0.0; samples],
+                holds: vec![false; samples],
+            },
             dt: 1e-3,
         }
     }
@@ -446,7 +614,7 @@ mod tests {
     fn a_link_that_falls_faster_than_its_spring_holds_stays_finite() {
         let coupling = Coupling { stiffness: 10.0, damping: 0.0, half_gap: 0.0 };
         let (drive, inertia, slope) = (vec![1.0; 5000], vec![0.1; 5000], vec![-1000.0; 5000]);
-        let link = Oscillator { drive: &drive, inertia: &inertia, slope: Some(&slope), coupling, dt: 2e-3 };
+        let link = Oscillator { drive: &drive, inertia: &inertia, slope: Some(&slope), drag: None, coupling, dt: 2e-3 };
         let ahead = link.wind_up(None);
         assert!(ahead.angle.iter().chain(&ahead.acceleration).all(|x| x.abs() < 1e7));
         assert!(ahead.angle.iter().any(|x| x.abs() > 1.0));

@@ -7,11 +7,12 @@
 //!
 //! ln p = −½ Σ ν_j ln v_j − ½ (Σ s_j / (ρ_j v_j) − bᵀA⁻¹b) − ½ ln|A| − ½ ln|P|,    ν_j = n_j / ρ_j.
 
-use super::Problem;
 use super::factor::Factor;
-use super::weigh::INEXACT;
+use super::weigh::{INEXACT, correlation_time};
+use super::{JointRows, Problem};
 use crate::band::Band;
 use crate::estimate::Fit;
+use crate::noise::Equalizer;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use statrs::function::erf::erfc;
@@ -72,15 +73,14 @@ impl Evidence {
         }
     }
 
-    /// By how many nats this account is likelier than another which makes so much less of noise, `quieter` nats. The evidence
-    /// of one fit and that of what is held out must agree, and the lesser counts. No account is exact: where blocks of time
-    /// vote against each other, a majority is no more than one (Vuong, Econometrica 57(2) 1989), their spread told by those
-    /// that vote against.
-    pub fn against(&self, other: &Evidence, quieter: f64) -> f64 {
+    /// By how many nats this account is likelier than another. The evidence of one fit and that of what is held out must agree,
+    /// and the lesser counts. No account is exact: where blocks of time vote against each other, a majority is no more than
+    /// one (Vuong, Econometrica 57(2) 1989), their spread told by those that vote against.
+    pub fn against(&self, other: &Evidence) -> f64 {
         let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).sum::<f64>();
-        let seen = sum(&self.seen, &other.seen) + self.occam - other.occam - quieter;
+        let seen = sum(&self.seen, &other.seen) + self.occam - other.occam;
         let votes = || self.held_out.iter().zip(&other.held_out).map(|(a, b)| a - b);
-        let held_out = votes().sum::<f64>() - quieter;
+        let held_out = votes().sum::<f64>();
         if seen * held_out <= 0.0 {
             return 0.0;
         }
@@ -156,9 +156,19 @@ impl Problem {
         empty.at(noise)
     }
 
+    /// What is left of a joint's rows by a fit, outliers cut, at the noise that an equaliser brings it to: rows of it that
+    /// count as one.
+    pub fn correlation_of(&self, fit: &Fit, equalizer: Option<&Equalizer>, band: &Band) -> Vec<f64> {
+        let of = |(j, joint): (usize, &JointRows)| {
+            let rest = joint.at_noise(band, j, joint.residual(&fit.columns, &fit.theta), equalizer);
+            correlation_time(&rest.iter().zip(&joint.robust).map(|(rest, weight)| rest * weight).collect::<Vec<_>>())
+        };
+        self.joints.iter().enumerate().map(of).collect()
+    }
+
     /// What logs say for an account at its exact law, as good as the whole problem is linear about it (Laplace). What is left
     /// has heavy tails, so that neither a glitch nor a blow decides, and of every `correlation[j]` rows of joint j one counts.
-    pub fn evidence(&self, fit: &Fit, correlation: &[f64], band: &Band) -> Evidence {
+    pub fn evidence(&self, fit: &Fit, equalizer: Option<&Equalizer>, correlation: &[f64], band: &Band) -> Evidence {
         let folds = Fit::without_folds(self, &fit.set);
         let blocks = vec![0.0; band.blocks];
         let noise = vec![1.0; self.joints.len()];
@@ -167,17 +177,17 @@ impl Problem {
             let inexact: Vec<f64> = joint.linear_target.iter().map(|x| (INEXACT * x).powi(2)).collect();
             let block = |row: &usize| band.rows[*row].block;
             let rest = joint.residual(&fit.columns, &fit.theta);
-            let (variance, nats) = heavy_tailed(&rest, &inexact, self.least_noise(j));
+            evidence.noise[j] = heavy_tailed(&rest, &inexact, self.least_noise(j)).0;
+            let (_, nats) = heavy_tailed(&joint.at_noise(band, j, rest, equalizer), &inexact, self.least_noise(j));
             for (row, nats) in joint.rows.iter().zip(nats) {
                 evidence.seen[block(row)] += nats / correlation[j];
             }
             let rests: Vec<Vec<f64>> = folds.iter().map(|fit| joint.residual(&fit.columns, &fit.theta)).collect();
             let rest: Vec<f64> = joint.rows.iter().enumerate().map(|(i, &r)| rests[band.rows[r].fold][i]).collect();
-            let (_, nats) = heavy_tailed(&rest, &inexact, self.least_noise(j));
+            let (_, nats) = heavy_tailed(&joint.at_noise(band, j, rest, equalizer), &inexact, self.least_noise(j));
             for (row, nats) in joint.rows.iter().zip(nats) {
                 evidence.held_out[block(row)] += nats / correlation[j];
             }
-            evidence.noise[j] = variance;
         }
         let score = self.score().at(evidence.noise.clone());
         // The coefficients are those of the fit, which knows more bounds than each its own.
@@ -430,7 +440,7 @@ mod tests {
     use super::*;
 
     /// Two accounts: by how many nats the first is likelier in each of twenty blocks, seen and held out.
-    fn odds(seen: [f64; 20], held_out: [f64; 20], quieter: f64) -> f64 {
+    fn odds(seen: [f64; 20], held_out: [f64; 20]) -> f64 {
         let account = |seen: &[f64], held_out: &[f64]| Evidence {
             seen: seen.to_vec(),
             held_out: held_out.to_vec(),
@@ -438,7 +448,7 @@ mod tests {
             noise: Vec::new(),
         };
         let (first, second) = (account(&seen, &held_out), account(&[0.0; 20], &[0.0; 20]));
-        let (ahead, behind) = (first.against(&second, quieter), second.against(&first, -quieter));
+        let (ahead, behind) = (first.against(&second), second.against(&first));
         assert!((ahead + behind).abs() < 1e-12, "what speaks for one speaks against the other: {ahead} {behind}");
         ahead
     }
@@ -446,16 +456,15 @@ mod tests {
     #[test]
     fn what_one_fit_gains_counts_as_far_as_it_is_gained_held_out_and_blocks_agree() {
         let all = [2.0; 20];
-        assert!((odds(all, [1.0; 20], 0.0) - 20.0).abs() < 1e-12, "the lesser counts");
-        assert_eq!(odds(all, [-1.0; 20], 0.0), 0.0, "a gain that is lost held out is none");
-        assert!(odds(all, all, 50.0) <= 0.0, "and so is one that noise explains");
+        assert!((odds(all, [1.0; 20]) - 20.0).abs() < 1e-12, "the lesser counts");
+        assert_eq!(odds(all, [-1.0; 20]), 0.0, "a gain that is lost held out is none");
         // The same sum from blocks that vote against each other is a bare majority.
         let split: [f64; 20] = std::array::from_fn(|i| if i % 2 == 0 { 24.0 } else { -20.0 });
-        let bare = odds(split, split, 0.0);
+        let bare = odds(split, split);
         assert!(bare > 0.0 && bare < 2.0, "{bare}");
         // One block alone may tell, where no other speaks against it.
         let one: [f64; 20] = std::array::from_fn(|i| if i == 3 { 40.0 } else { 0.0 });
-        assert!((odds(one, one, 0.0) - 40.0).abs() < 1e-12);
+        assert!((odds(one, one) - 40.0).abs() < 1e-12);
     }
 
     #[test]

@@ -182,16 +182,6 @@ impl Problem {
         1.0 / (self.sigma[joint] * self.sigma[joint] * self.correlation[joint])
     }
 
-    /// Rows of each joint that count as one.
-    pub fn correlation(&self) -> &[f64] {
-        &self.correlation
-    }
-
-    /// Number of rows of a joint.
-    pub fn rows(&self, joint: usize) -> f64 {
-        self.joints[joint].rows.len() as f64
-    }
-
     /// Least variance of the rows of a joint: what sampling and integration leave, (N m)² or N².
     pub(super) fn least_noise(&self, joint: usize) -> f64 {
         (IMMATERIAL * self.scale[joint]).powi(2)
@@ -199,7 +189,7 @@ impl Problem {
 }
 
 /// Rows per independent row: 1 + 2 Σ ρ_k over the first lags whose autocorrelation ρ_k is positive.
-fn correlation_time(x: &[f64]) -> f64 {
+pub(super) fn correlation_time(x: &[f64]) -> f64 {
     let power: f64 = x.iter().map(|v| v * v).sum();
     if power <= 0.0 {
         return 1.0;

@@ -4,7 +4,7 @@ use super::{Direction, Plant};
 use crate::Motion;
 use crate::filter::{bristle, early, first_derivative, first_order, late};
 use crate::motion::mean_size;
-use crate::wind_up::{Coupling, JointRun, Oscillator, WindUp, inertia_about, slope_about};
+use crate::wind_up::{Coupling, Drag, JointRun, Oscillator, WindUp, inertia_about, slope_about};
 
 /// Steps of Newton's method towards an effort that friction under load grows with; it is a contraction.
 const LOAD_STEPS: usize = 4;
@@ -25,6 +25,8 @@ struct Turning {
     joint: usize,
     rotor: f64,
     ahead: WindUp,
+    /// Torque through the coupling, sample by sample, N m (N).
+    passed: Vec<f64>,
 }
 
 impl Plant {
@@ -73,18 +75,31 @@ impl Plant {
 
     /// The same where the effort acts, `tau` delayed and lagged.
     fn residuals_where_it_acts(&mut self, motion: &Motion, tau: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let bristles: Vec<Vec<f64>> =
-            self.bristles.iter().map(|b| bristle(&motion.v[b.joint], b.stiffness / b.coulomb, motion.dt)).collect();
+        let bristles = self.bristles_along(motion);
         let mut rest = self.run(motion, tau, &bristles, &[]);
         let turns = |plant: &Plant, d: usize| plant.drives[d].rotor > 0.0 || plant.motor_encoders;
         if (0..self.drives.len()).any(|d| turns(self, d)) {
-            let turning = self.turning(motion, tau, &rest);
+            let drags = self.drags(motion, tau, &rest, &bristles);
+            let turning = self.turning(motion, tau, &rest, &drags);
             if self.motor_encoders {
                 rest = self.run(motion, tau, &bristles, &turning);
+                // Where the link sticks its friction holds anything, but the motor passes on what its coupling holds.
+                for drive in &turning {
+                    let j = drive.joint;
+                    for (k, rest) in rest[j].iter_mut().enumerate() {
+                        let delivered = self.actuation.at_joint(j, tau[j][k]);
+                        *rest = delivered - drive.rotor * motion.a[j][k] - drive.passed[k];
+                    }
+                }
             } else {
                 for drive in &turning {
-                    for (rest, acceleration) in rest[drive.joint].iter_mut().zip(&drive.ahead.acceleration) {
-                        *rest -= drive.rotor * acceleration;
+                    let j = drive.joint;
+                    for (k, rest) in rest[j].iter_mut().enumerate() {
+                        if drags[j].holds[k] && drive.rotor > 0.0 {
+                            let delivered = self.actuation.at_joint(j, tau[j][k]);
+                            *rest = delivered - drive.rotor * motion.a[j][k] - drive.passed[k];
+                        }
+                        *rest -= drive.rotor * drive.ahead.acceleration[k];
                     }
                 }
             }
@@ -118,11 +133,20 @@ impl Plant {
     pub fn joint_runs(&mut self, motion: &Motion) -> Vec<JointRun> {
         let tau = self.late(&self.limited(motion), motion.dt);
         let rest = self.residuals_where_it_acts(motion, &tau);
+        let bristles = self.bristles_along(motion);
+        let acting: Vec<Vec<f64>> = rest
+            .iter()
+            .zip(&self.actuation.gain)
+            .map(|(rest, gain)| rest.iter().map(|rest| rest * gain).collect())
+            .collect();
+        let drags = self.drags(motion, &tau, &acting, &bristles);
         tau.into_iter()
             .zip(rest)
+            .zip(drags)
             .enumerate()
-            .map(|(j, (tau, rest))| {
+            .map(|(j, ((tau, rest), drag))| {
                 let gain = self.actuation.gain[j];
+                let over_gain = |x: Vec<f64>| x.into_iter().map(|x| x / gain).collect();
                 let inertia = inertia_about(&self.model, &mut self.data, motion, j);
                 let slope = slope_about(&self.model, &mut self.data, motion, j);
                 JointRun {
@@ -131,7 +155,49 @@ impl Plant {
                     acceleration: motion.a[j].clone(),
                     inertia: inertia.iter().map(|inertia| inertia / gain).collect(),
                     slope: slope.iter().map(|slope| slope / gain).collect(),
+                    drag: Drag {
+                        dry: over_gain(drag.dry),
+                        viscous: drag.viscous / gain,
+                        taken: over_gain(drag.taken),
+                        ..drag
+                    },
                     dt: motion.dt,
+                }
+            })
+            .collect()
+    }
+
+    fn bristles_along(&self, motion: &Motion) -> Vec<Vec<f64>> {
+        self.bristles.iter().map(|b| bristle(&motion.v[b.joint], b.stiffness / b.coulomb, motion.dt)).collect()
+    }
+
+    /// Friction of each joint by itself along a run that leaves `rest`, the gain not yet divided by.
+    fn drags(&mut self, motion: &Motion, tau: &[Vec<f64>], rest: &[Vec<f64>], bristles: &[Vec<f64>]) -> Vec<Drag> {
+        let smooth = |d: &Direction| match d.parts.as_slice() {
+            [_] => Direction { parts: d.parts.clone(), inertia: d.inertia, ..Direction::default() },
+            _ => d.clone(),
+        };
+        let smooth: Vec<Direction> = self.directions.iter().map(smooth).collect();
+        let directions = std::mem::replace(&mut self.directions, smooth);
+        let without = self.run(motion, tau, bristles, &[]);
+        self.directions = directions;
+        let mut delivered = vec![0.0; motion.q.len()];
+        (0..motion.q.len())
+            .map(|j| {
+                let own = self.directions.iter().find(|d| d.parts == [(j, 1.0)]);
+                let mut bound = |k: usize| {
+                    delivered[j] = self.actuation.at_joint(j, tau[j][k]);
+                    let time = motion.start + k as f64 * motion.dt;
+                    own.map_or(0.0, |own| own.bound(motion.v[j][k], time, &delivered).max(0.0))
+                };
+                let dry: Vec<f64> = (0..motion.len()).map(&mut bound).collect();
+                let rests = |(speed, dry): (&f64, &f64)| speed.abs() < motion.standstill[j] && *dry > 0.0;
+                Drag {
+                    holds: motion.v[j].iter().zip(&dry).map(rests).collect(),
+                    dry,
+                    viscous: own.map_or(0.0, |own| own.viscous.max(0.0)),
+                    taken: without[j].iter().zip(&rest[j]).map(|(without, with)| without - with).collect(),
+                    speed: motion.v[j].clone(),
                 }
             })
             .collect()
@@ -143,6 +209,7 @@ impl Plant {
         let mut out = vec![Vec::with_capacity(motion.len()); n];
         let [mut q, mut v, mut a, mut effort, mut rest] = std::array::from_fn(|_| vec![0.0; n]);
         let mut bent = vec![0.0; bristles.len()];
+        let mut dry = vec![Vec::with_capacity(motion.len()); n];
         for k in 0..motion.len() {
             for j in 0..n {
                 (q[j], v[j], a[j], effort[j]) = (motion.q[j][k], motion.v[j][k], motion.a[j][k], tau[j][k]);
@@ -159,17 +226,31 @@ impl Plant {
                 effort_noise: motion.effort_noise,
             };
             self.rest(&q, &v, &a, &effort, motion.standstill, &past, &mut rest);
+            dry.iter_mut()
+                .zip(&self.scratch.smooth)
+                .zip(&rest)
+                .for_each(|((dry, smooth), rest)| dry.push(smooth - rest));
             for drive in turning {
                 // The rotor turns as the motor does, ahead of the link.
                 rest[drive.joint] -= drive.rotor * drive.ahead.acceleration[k];
             }
             out.iter_mut().zip(&rest).for_each(|(out, rest)| out.push(*rest));
         }
+        // Dry friction jumps as the speed changes sign; the signals about that are smooth.
+        for (j, (out, dry)) in
+            out.iter_mut().zip(&dry).enumerate().filter(|(_, (_, dry))| dry.iter().any(|f| *f != 0.0))
+        {
+            for (k, smeared) in motion.smeared(dry, &motion.v[j]).into_iter().enumerate() {
+                if motion.v[j][k].abs() >= motion.standstill[j] {
+                    out[k] += dry[k] - smeared;
+                }
+            }
+        }
         out
     }
 
     /// Wind-up of every drive, from what links take that go with their motors.
-    fn turning(&mut self, motion: &Motion, tau: &[Vec<f64>], rest: &[Vec<f64>]) -> Vec<Turning> {
+    fn turning(&mut self, motion: &Motion, tau: &[Vec<f64>], rest: &[Vec<f64>], drags: &[Drag]) -> Vec<Turning> {
         (0..self.drives.len())
             .map(|d| {
                 let drive = &self.drives[d];
@@ -185,13 +266,22 @@ impl Plant {
                 let ahead = if self.motor_encoders {
                     let inertia = inertia_about(&self.model, &mut self.data, motion, j);
                     let slope = slope_about(&self.model, &mut self.data, motion, j);
-                    let slope = Some(&slope[..]);
-                    let link = Oscillator { drive: &taken, inertia: &inertia, slope, coupling, dt: motion.dt };
+                    let drag = &drags[j];
+                    let smooth: Vec<f64> = taken.iter().zip(&drag.taken).map(|(taken, drag)| taken - drag).collect();
+                    let link = Oscillator {
+                        drive: &smooth,
+                        inertia: &inertia,
+                        slope: Some(&slope),
+                        drag: Some(drag),
+                        coupling,
+                        dt: motion.dt,
+                    };
                     link.wind_up(Some(&turning))
                 } else {
-                    WindUp::of_motor(&turning, &taken, rotor, &coupling, motion.dt)
+                    WindUp::of_motor(&turning, &taken, &drags[j].holds, rotor, &coupling, motion.dt)
                 };
-                Turning { joint: j, rotor, ahead }
+                let passed = ahead.torque(&coupling);
+                Turning { joint: j, rotor, ahead, passed }
             })
             .collect()
     }
@@ -234,6 +324,7 @@ impl Plant {
                 residual[j] -= weight * force;
             }
         }
+        s.smooth[..q.len()].copy_from_slice(residual);
         let sliding = |bound: f64, speed: f64, band: f64, hold: f64| {
             let limit = bound.max(0.0);
             if speed.abs() >= band { bound * speed.signum() } else { hold.clamp(-limit, limit) }

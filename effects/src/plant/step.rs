@@ -31,6 +31,8 @@ pub(super) struct Scratch {
     pub(super) contact: Vec<f64>,
     /// Torque from outside the plant, N m, n; held over the step.
     outside: Vec<f64>,
+    /// What all but dry friction leaves of a sample of a measured motion, N m, n.
+    pub(super) smooth: Vec<f64>,
 }
 
 impl Scratch {
@@ -51,6 +53,7 @@ impl Scratch {
             force,
             contact: vec![0.0; joints],
             outside: vec![0.0; joints],
+            smooth: vec![0.0; joints],
         }
     }
 }

@@ -1,0 +1,182 @@
+//! What two accounts of the logs make of noise, and their residuals told at one noise.
+//!
+//! A law that filters what was measured (a spring, play, a lag) makes more of its noise at some frequencies and less at others.
+//! The probability of the logs is that of what is left times how far each sample of it moves with the effort that was
+//! logged (the Jacobian of a change of variables). So each account runs a second time with some noise more; where one makes
+//! more of it than the other, what it leaves is scaled down to what the other makes of it, frequency by frequency.
+
+use crate::band::Band;
+use crate::diagnose::Logs;
+use crate::gap::{self, Rows};
+use crate::refine::Data;
+use crate::search::{Chosen, Rest};
+use crate::signals::Signals;
+use gapscope_effects::EffectError;
+use rustfft::{FftPlanner, num_complex::Complex};
+
+/// Edges of the frequencies that are told apart, in multiples of the band's cut-off: as wide as what a spring does to noise.
+const EDGES: [f64; 10] = [0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.25];
+const BANDS: usize = EDGES.len() - 1;
+/// Part of its noise that a second run has once more: so little that play hits its stops as it did.
+pub(crate) const PART_OF_NOISE: f64 = 0.3;
+
+/// What a law makes of noise is known to this part: how much of it is the position's and how much the effort's, how white.
+const KNOWN_TO: f64 = 0.15;
+
+/// Factors by joint and frequency that an account's residual is scaled by.
+#[derive(Debug, Clone)]
+pub struct Equalizer(Vec<[f64; BANDS]>);
+
+impl Equalizer {
+    /// Rows of a joint, all those of a band, at the noise that both accounts have.
+    pub fn apply(&self, band: &Band, joint: usize, rows: &mut [f64]) {
+        let scale = self.0[joint];
+        if scale.iter().any(|scale| *scale < 1.0) {
+            in_frequency(band, rows, |of| scale[of]);
+        }
+    }
+}
+
+impl Logs<'_> {
+    /// What brings the residuals of two accounts, each with what it leaves of every run, to one noise. Noise of the position is
+    /// white. Noise of the effort is as what is left by the account that leaves more, played backwards: the same spectrum,
+    /// which no law of the motion made.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub(crate) fn at_one_noise(&self, accounts: [(&Chosen, &Rest); 2]) -> Result<[Equalizer; 2], EffectError> {
+        let n = self.model.dof();
+        let rows = |rest: &Rest| -> Rows { (0..n).map(|j| self.sliding_rows(j, rest)).collect() };
+        let run = |chosen: &Chosen, signals: &[Signals]| {
+            let rest = Data { signals, ..self.data(&chosen.noise) }.rest(&chosen.exact, &chosen.fit)?;
+            Ok::<_, EffectError>(rows(&rest))
+        };
+        let plain = accounts.map(|(_, rest)| rows(rest));
+        let of_position = [run(accounts[0].0, &self.noisier)?, run(accounts[1].0, &self.noisier)?];
+        let mut noisier = self.noisier.clone();
+        for j in 0..n {
+            let left = |i: usize| PART_OF_NOISE * size(&plain[i][j]);
+            let more = usize::from(left(1) > left(0));
+            let position = size(&less(&of_position[more][j], &plain[more][j]));
+            let part = if left(more) > 0.0 { (1.0 - (position / left(more)).powi(2)).max(0.0).sqrt() } else { 0.0 };
+            for (s, rest) in noisier.iter_mut().zip(accounts[more].1) {
+                let backwards = rest[j].iter().rev();
+                s.tau[j].iter_mut().zip(backwards).for_each(|(tau, rest)| *tau += PART_OF_NOISE * part * rest);
+            }
+        }
+        let through = |i: usize| -> Result<Vec<[f64; BANDS]>, EffectError> {
+            let noisier = run(accounts[i].0, &noisier)?;
+            Ok((0..n).map(|j| self.levels(&less(&noisier[j], &plain[i][j]))).collect())
+        };
+        let through = [through(0)?, through(1)?];
+        let filters = [0, 1].map(|i: usize| accounts[i].0.filters_beyond(accounts[1 - i].0));
+        let scale = |i: usize| {
+            let of = |j: usize| {
+                std::array::from_fn(|b| {
+                    let less = through[1 - i][j][b] - through[i][j][b];
+                    // In doubt for the account without the law.
+                    let doubt = if filters[1 - i] && !filters[i] { less.abs().min(KNOWN_TO) } else { 0.0 };
+                    (less.min(0.0) - doubt).exp()
+                })
+            };
+            Equalizer((0..n).map(of).collect())
+        };
+        Ok([scale(0), scale(1)])
+    }
+
+    /// What is left of a joint at all rows, nothing where it rests.
+    fn sliding_rows(&self, joint: usize, rest: &Rest) -> Vec<f64> {
+        let of = |(e, (s, rest)): (usize, (&Signals, &Vec<Vec<f64>>))| {
+            let rows = self.band.filter_where(e, &s.slides(joint, self.still[joint]), &rest[joint]);
+            rows.into_iter().map(|row| row.unwrap_or(0.0)).collect::<Vec<_>>()
+        };
+        self.signals.iter().zip(rest).enumerate().flat_map(of).collect()
+    }
+
+    /// Mean logarithm over blocks of time of the size of a signal at all rows, in each band of frequencies.
+    fn levels(&self, rows: &[f64]) -> [f64; BANDS] {
+        std::array::from_fn(|band| {
+            let mut part = rows.to_vec();
+            in_frequency(&self.band, &mut part, |of| f64::from(u8::from(of == band)));
+            let blocks = gap::squares(&self.band, &Rows::from([part]), |_| true);
+            let levels: Vec<f64> = blocks.iter().map(|b| 0.5 * (b[0] / b[1]).max(f64::MIN_POSITIVE).ln()).collect();
+            levels.iter().sum::<f64>() / levels.len().max(1) as f64
+        })
+    }
+}
+
+/// Multiplies each band of frequencies of each episode of some rows by a factor.
+fn in_frequency(band: &Band, rows: &mut [f64], factor: impl Fn(usize) -> f64) {
+    let mut planner = FftPlanner::new();
+    let spacing = band.spacing();
+    for (episode, at) in band.of_episode.iter().enumerate().filter(|(_, at)| !at.is_empty()) {
+        let length = at.len();
+        let mut spectrum: Vec<Complex<f64>> = rows[at.clone()].iter().map(|&x| Complex::new(x, 0.0)).collect();
+        planner.plan_fft_forward(length).process(&mut spectrum);
+        for (bin, value) in spectrum.iter_mut().enumerate() {
+            let frequency = bin.min(length - bin) as f64 / (length as f64 * spacing[episode]);
+            let place = (1..BANDS).rposition(|edge| frequency >= EDGES[edge] * band.cutoff).map_or(0, |at| at + 1);
+            *value *= factor(place) / length as f64;
+        }
+        planner.plan_fft_inverse(length).process(&mut spectrum);
+        rows[at.clone()].iter_mut().zip(&spectrum).for_each(|(row, value)| *row = value.re);
+    }
+}
+
+fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// Standard deviation of normal noise with outliers, where there is any.
+fn size(x: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = x.iter().map(|x| x.abs()).filter(|x| *x > 0.0).collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let middle = sizes.len() / 2;
+    // 0.6745 is the median of |N(0, 1)|.
+    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::support::{fitted, torque};
+    use gapscope_effects::Kind;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn an_equalizer_scales_the_frequencies_at_which_an_account_makes_more_of_noise() {
+        let band = fitted(Kind::ViscousFriction, torque(|v| v)).1;
+        let mut scale = [1.0; BANDS];
+        scale[7] = 0.5;
+        let equalizer = Equalizer(vec![[1.0; BANDS], scale]);
+        for (frequency, left) in [(0.08, 1.0), (0.55, 0.5), (0.95, 1.0)] {
+            let mut wave = vec![0.0; band.rows.len()];
+            for (e, at) in band.of_episode.iter().enumerate() {
+                // Whole periods: no other frequency is in it.
+                let length = at.len() as f64;
+                let periods = (frequency * band.cutoff * length * band.spacing()[e]).round();
+                for (i, row) in at.clone().enumerate() {
+                    wave[row] = (TAU * periods * i as f64 / length).sin();
+                }
+            }
+            let mut rows = wave.clone();
+            equalizer.apply(&band, 1, &mut rows);
+            let off = rows.iter().zip(&wave).map(|(x, wave)| (x - left * wave).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-9, "{frequency}: {off}");
+            let mut rows = wave.clone();
+            equalizer.apply(&band, 0, &mut rows);
+            assert_eq!(rows, wave);
+        }
+    }
+
+    #[test]
+    fn the_size_of_noise_is_told_beside_outliers_and_rests() {
+        let mut noise: Vec<f64> = (0..1000).map(|i| if i % 2 == 0 { 0.6745 } else { -0.6745 }).collect();
+        noise.extend([50.0; 20]);
+        noise.extend([0.0; 500]);
+        assert!((size(&noise) - 1.0).abs() < 1e-9);
+        assert_eq!(size(&[0.0; 5]), 0.0);
+    }
+}

@@ -64,8 +64,7 @@ pub(crate) fn split(table: Table, name: &str) -> (Vec<Episode>, Vec<String>) {
     if !parts.is_empty() {
         notes.extend(jitter(&steps, dt, &is_gap));
         if dt > LONGEST_STEP {
-            parts.clear();
-            notes.push(format!("the median step of time is {dt} s, too long to show how a robot moves: left out; if the stamps are in another unit, scale them in the column map (time = {{ column = \"…\", scale = 0.001 }} for ms)"));
+            notes.push(format!("the median step of time is {dt} s, too long to show how a robot moves; if the stamps are in another unit, scale them in a column map (--map-file with `[columns]` and below it `time = {{ column = \"time\", scale = 0.001 }}` for ms)"));
         }
     }
     (parts, notes)

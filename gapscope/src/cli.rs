@@ -534,6 +534,9 @@ pub struct MakeBank {
     /// none; 2 for arms that are off by more. `--cases` counts them [default: each further kind once]
     #[arg(long, value_name = "1|2", num_args = 0..=1, default_missing_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
     pub used: Option<u8>,
+    /// Spoil the logs of two cases in three by one fault drawn at random: a unit, a sign, a clock, an effort not recorded, …
+    #[arg(long)]
+    pub faulty: bool,
     /// Robots, taken in turn: arm7, arm6, double_pendulum, or URDF files
     #[arg(long, value_name = "ROBOT,…", value_delimiter = ',', default_value = "arm7")]
     pub robots: Vec<String>,

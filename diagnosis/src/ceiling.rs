@@ -15,7 +15,8 @@ impl Outcome {
     /// so that they are no more than possible, and nothing is explained.
     pub fn within_physics(&mut self, model: &Model) {
         let diagnosis = &mut self.diagnosis;
-        let worse = diagnosis.shrink.torque.shrink.is_some_and(|shrink| shrink < 0.0);
+        // Worse beyond doubt: the whole interval says so.
+        let worse = diagnosis.shrink.torque.ci95.is_some_and(|[_, most]| most < 0.0);
         let said: Vec<Option<String>> = diagnosis
             .effects
             .iter()

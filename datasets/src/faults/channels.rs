@@ -33,8 +33,8 @@ pub(crate) fn wrapped(logs: &Logs, e: usize) -> Vec<(usize, f64)> {
     (0..logs.model.dof()).filter_map(of).collect()
 }
 
-/// The samples of a log that are readings, where all positions hold for several samples and then jump together.
-pub(crate) fn readings(logs: &Logs, e: usize) -> Option<Vec<usize>> {
+/// The samples of a log that are readings, and the usual number of samples from one to the next, where all positions hold for several samples and then jump together.
+pub(crate) fn readings(logs: &Logs, e: usize) -> Option<(Vec<usize>, f64)> {
     let episode = logs.episodes[e];
     let n = logs.model.dof();
     let moving: Vec<usize> = (0..n).filter(|&j| logs.traits[e][j].high > logs.traits[e][j].low).collect();
@@ -57,7 +57,7 @@ pub(crate) fn readings(logs: &Logs, e: usize) -> Option<Vec<usize>> {
     let mut gaps: Vec<f64> = kept.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect();
     let usual = median(&mut gaps)?;
     let steady = gaps.iter().filter(|gap| (*gap - usual).abs() <= 1.0).count() * 10 >= 8 * gaps.len();
-    (!by_raster && steady && usual >= 2.0).then_some(kept)
+    (!by_raster && steady && usual >= 2.0).then_some((kept, usual))
 }
 
 /// Joints whose position is the set point to the bit.

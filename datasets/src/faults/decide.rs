@@ -4,7 +4,7 @@ use super::change::Change;
 use super::effort;
 use super::motion::{self, Account, Kind, Scene};
 use super::sample::Sample;
-use super::weigh::{Freedom, Weighed, weigh};
+use super::weigh::{Weighed, weigh_either};
 use super::words::{per_cent, phrase};
 use super::{Doubt, Fault, FaultKind};
 use crate::check::Logs;
@@ -24,10 +24,16 @@ const APART: f64 = 6.0;
 const COST: f64 = 5.0;
 /// What a scale of the effort costs beside an account of the motion, in nats: of mirror images, the one without.
 const SCALE_COST: f64 = 8.0;
+/// What a clock gains, in nats, by steps of time that no log has, or by velocities that are all off by its factor.
+const BESIDE: f64 = 30.0;
 /// Zeros off by less than this are an effect, rad.
 const ZERO: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// An account is none where it leaves more than this of the effort, as a geometric mean of squared shares.
 const EXPLAINS: f64 = 0.45;
+/// As logged some joint must leave more than this of its effort, squared, for a fault to be beyond doubt, ...
+const NOTABLE: f64 = 0.05;
+/// ... or the log must ask this much more of the robot's bodies and rotors, in nats.
+const MUCH: f64 = 4.0 * SURE;
 /// The usual step of time beyond which a clock cannot be in seconds, s.
 const SLOWEST: f64 = 0.2;
 
@@ -67,7 +73,7 @@ impl Decision<'_> {
             velocity: motion::velocity_slope(logs),
         };
         let logged = self.weighed(self.model, sample, active);
-        if logged.0.is_plain(active) && !scene.slow {
+        if logged.0.is_plain(active) && !scene.slow && !scene.velocity_asks() {
             return None;
         }
         let base = scene.as_logged();
@@ -86,7 +92,11 @@ impl Decision<'_> {
                 };
                 let (weighed, extra) = self.weighed(&model, &changed, active);
                 // What limits and velocity say counts as in the first look.
-                let beside = if account.kind == Kind::Clock && slow { 30.0 } else { 0.0 };
+                let beside = match account.kind {
+                    Kind::Clock if slow => BESIDE,
+                    Kind::Clock if scene.velocity_says(account.value) => BESIDE,
+                    _ => 0.0,
+                };
                 // Another size of gravity is another planet: a clock is the likelier account.
                 let size = account.kind == Kind::Gravity && (account.value - 1.0).abs() > 0.1;
                 let unlikely = if size { 3.0 * COST } else { 0.0 };
@@ -119,11 +129,14 @@ impl Decision<'_> {
         // A clock, a zero and a sign may show in what the log as it is asks of bodies and rotors.
         let asks = logged.0.asked - weighed.asked;
         let bent = match account.kind {
-            Kind::Clock => slow || asks > SURE,
+            Kind::Clock => slow || asks > SURE || (scene.velocity_says(account.value) && after < 1.1 * before),
             Kind::Zero | Kind::Sign | Kind::Axis => asks > 2.0 * SURE,
             _ => false,
         };
         let clearly = after < 0.1 && after < 0.2 * before;
+        let notable = account.kind == Kind::Clock
+            || asks > MUCH
+            || (0..n).any(|j| active[j] && logged.0.unexplained[j] > NOTABLE);
         let explains = after < most && (after < 0.6 * before && (0..n).any(tells) || clearly || bent);
         // A turned base and the zero or the sign of its first joint are one and the same.
         let twins = |a: Kind, b: Kind| a == Kind::Gravity && matches!(b, Kind::Zero | Kind::Sign | Kind::Axis);
@@ -133,10 +146,11 @@ impl Decision<'_> {
         if let Some((_, twin, left_by)) = rival.filter(|(_, rival, _)| !apart && twins(account.kind, rival.kind))
             && margin > sure
             && explains
+            && notable
         {
             return Some(Ok(self.fault(logs, twin, before, left(left_by, active))));
         }
-        if margin > sure && explains && apart {
+        if margin > sure && explains && apart && notable {
             let account = self.sharpened(logs, sample, active, account.clone());
             return Some(Ok(self.fault(logs, &account, before, after)));
         }
@@ -150,18 +164,19 @@ impl Decision<'_> {
             question += &format!("; or {}", phrase(logs, other));
         }
         let joints = account.joints.iter().map(|&j| logs.model.joints()[j].name.clone()).collect();
-        (after < 0.6 * before && margin > sure).then_some(Err(Doubt { question, joints, effects: Vec::new() }))
+        (explains && margin > sure).then_some(Err(Doubt { question, joints, effects: Vec::new() }))
     }
 
     /// An account with whatever scale of the efforts suits it, and what those scales cost.
     pub fn weighed(&self, model: &Model, sample: &Sample, active: &[bool]) -> (Weighed, f64) {
         let scales = effort::first_scales(model, sample, active);
         let cost = scales_cost(&scales, active);
-        let plain = weigh(model, sample, &vec![1.0; scales.len()], active, Freedom::ORDINARY);
+        let plain = weigh_either(model, sample, &vec![1.0; scales.len()], active);
         if cost == 0.0 {
             return (plain, 0.0);
         }
-        let (_, scaled) = effort::fine_scales(model, sample, scales, active);
+        let (scales, _) = effort::fine_scales(model, sample, scales, active);
+        let scaled = weigh_either(model, sample, &scales, active);
         if scaled.score - cost > plain.score { (scaled, cost) } else { (plain, 0.0) }
     }
 

@@ -1,7 +1,7 @@
 //! What is wrong with the effort by itself: not recorded, noise, without its sign, cut off, in another unit, late.
 
 use super::sample::Sample;
-use super::weigh::{Freedom, Weighed, weigh};
+use super::weigh::{Freedom, Weighed, weigh, weigh_either};
 use crate::check::{Fit, Logs, fit};
 use crate::robust::rms;
 use gapscope_dynamics::Model;
@@ -115,17 +115,31 @@ pub(crate) fn first_scales(model: &Model, sample: &Sample, active: &[bool]) -> V
         let found = explained(sample, &torque, j).filter(|_| active[j]);
         found
             .filter(|fit| fit.correlation.abs() > 0.5 && fit.weight * fit.gain.abs() > 0.05)
-            .map_or(1.0, |fit| if (PLAIN.0..PLAIN.1).contains(&fit.gain) { 1.0 } else { fit.gain })
+            .map(|fit| if (PLAIN.0..PLAIN.1).contains(&fit.gain) { 1.0 } else { fit.gain })
     };
-    let scales: Vec<f64> = (0..model.dof()).map(scale).collect();
-    common(&scales, active).unwrap_or(scales)
+    let told: Vec<Option<f64>> = (0..model.dof()).map(scale).collect();
+    if let Some(one) = common(&told, active) {
+        return one;
+    }
+    let each: Vec<f64> = told.iter().map(|scale| scale.unwrap_or(1.0)).collect();
+    if !each.iter().any(|scale| *scale < 0.0) {
+        return each;
+    }
+    // Of a robot whose efforts are all turned round, some joints alone seem to need nothing.
+    let turned: Vec<f64> = active.iter().map(|active| if *active { -1.0 } else { 1.0 }).collect();
+    let score = |scales: &[f64]| weigh_either(model, sample, scales, active).score;
+    if score(&turned) > score(&each) { turned } else { each }
 }
 
-/// One scale for all joints, where most ask for about the same.
-fn common(scales: &[f64], active: &[bool]) -> Option<Vec<f64>> {
-    let asked: Vec<f64> = (0..scales.len()).filter(|&j| active[j] && scales[j] != 1.0).map(|j| scales[j]).collect();
-    let all = active.iter().filter(|active| **active).count();
-    if asked.len() < 2 || 2 * asked.len() <= all || asked.iter().any(|s| *s < 0.0) != asked.iter().all(|s| *s < 0.0) {
+/// One scale for all joints, where most of those that tell one ask for about the same. A wrist that bears little but friction
+/// tells none, and follows.
+fn common(told: &[Option<f64>], active: &[bool]) -> Option<Vec<f64>> {
+    let telling: Vec<f64> = told.iter().flatten().copied().collect();
+    let asked: Vec<f64> = telling.iter().copied().filter(|scale| *scale != 1.0).collect();
+    if asked.len() < 2
+        || 2 * asked.len() <= telling.len()
+        || asked.iter().any(|s| *s < 0.0) != asked.iter().all(|s| *s < 0.0)
+    {
         return None;
     }
     let mut logs: Vec<f64> = asked.iter().map(|s| s.abs().ln()).collect();

@@ -17,6 +17,13 @@ const BEYOND: f64 = 0.7;
 /// What a clock counts that a measured velocity speaks against.
 const AGAINST_VELOCITY: f64 = 2.0;
 
+/// The motor's side of a gear, or counts, make positions this many times larger at least; what is smaller has a unit with a name.
+const LEAST_GEAR: f64 = 4.0;
+/// A velocity off by more than this, as a logarithm, may be that of another clock.
+const OTHER_CLOCK: f64 = 0.2;
+/// A clock and a velocity agree where they differ by less than this, as a logarithm.
+const AGREES: f64 = 0.1;
+
 /// Places at which grids are looked at.
 const COARSE: usize = 60;
 /// What a gain far from one counts where a clock is looked for.
@@ -88,6 +95,16 @@ impl Scene<'_> {
         (0..model.dof()).map(|j| if self.active[j] { left(j) } else { 0.0 } + BEYOND * beyond(model, j, range[j])).sum()
     }
 
+    /// Whether the velocities that were measured speak for another clock, or may: they are all off, and by one factor.
+    pub fn velocity_asks(&self) -> bool {
+        self.velocity.is_some_and(|slope| slope.abs().ln().abs() > OTHER_CLOCK)
+    }
+
+    /// Whether they speak for a clock with so many seconds a true second: what a true velocity is then off by.
+    pub fn velocity_says(&self, logged: f64) -> bool {
+        self.velocity_asks() && self.velocity.is_some_and(|slope| (slope.abs() / logged).ln().abs() < AGREES)
+    }
+
     /// The look of changed positions and time.
     fn changed(&self, changes: &[Change]) -> f64 {
         let mut sample = self.sample.clone();
@@ -105,11 +122,9 @@ impl Scene<'_> {
                     range = order.iter().map(|&j| range[j]).collect();
                 }
                 Change::Clock(factor) => {
-                    if let Some(slope) = self.velocity {
-                        // Seconds of the clock a true second: what a true velocity is off by.
-                        let agrees = (slope.abs() * factor).ln().abs() < 0.1;
-                        let far = factor.ln().abs() > 0.2;
-                        against += if agrees && far { -AGAINST_VELOCITY } else { AGAINST_VELOCITY };
+                    if self.velocity.is_some() {
+                        against +=
+                            if self.velocity_says(factor.recip()) { -AGAINST_VELOCITY } else { AGAINST_VELOCITY };
                     }
                 }
                 _ => {}
@@ -158,7 +173,7 @@ impl Scene<'_> {
                 scene.account(Kind::Scale, group.clone(), changes, logged)
             };
             let at = |logged: f64| on(self, logged);
-            let grid = (0..72).map(|i| 1.6 * 1.115_f64.powi(i)).chain((0..30).map(|i| 0.6 / 1.115_f64.powi(i)));
+            let grid = (0..65).map(|i| LEAST_GEAR * 1.115_f64.powi(i));
             let units = position_units(prismatic(group[0])).into_iter().map(|(_, factor)| factor);
             let looks = grid.chain(units).map(|logged| on(coarse, logged));
             let Some(found) = looks.min_by(|a, b| a.look.total_cmp(&b.look)).map(|found| at(found.value)) else {
@@ -234,7 +249,9 @@ impl Scene<'_> {
             .filter(|named| (named.value / fine.value).ln().abs() < 0.12 || self.slow)
             .filter(|named| named.look < fine.look + 0.3)
             .min_by(|a, b| a.look.total_cmp(&b.look));
-        vec![named.unwrap_or(fine)]
+        // A measured velocity that another clock would put right names that clock.
+        let measured = self.velocity.map(f64::abs).filter(|slope| slope.ln().abs() > OTHER_CLOCK).map(at);
+        [Some(named.unwrap_or(fine)), measured].into_iter().flatten().collect()
     }
 
     /// How far the gains of the joints lie from one on another clock: the median of their logarithms' sizes. Without gravity,

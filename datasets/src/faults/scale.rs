@@ -4,7 +4,7 @@ use super::change::Change;
 use super::decide::scales_cost;
 use super::effort::{GAINS, beyond_the_end, cut_off, effort_unit, fine_scales, first_scales};
 use super::sample::Sample;
-use super::weigh::{Freedom, weigh};
+use super::weigh::{Freedom, spread, weigh, weigh_either};
 use super::{Doubt, Fault, FaultKind, figure};
 use crate::check::Logs;
 use crate::robust::rms;
@@ -12,6 +12,9 @@ use gapscope_dynamics::Model;
 
 /// By how much, in nats, a scale must be the likelier account.
 const SURE: f64 = 12.0;
+/// A joint is a witness of its own scale where the model's torque changes by this part of the limit, and of that of the joint
+/// where it changes most: below, friction and what hangs on the drive make most of its effort.
+const WITNESS: f64 = 0.04;
 /// A log cuts the effort off where the motion shows it to go on by this part beyond.
 const CUT: f64 = 0.08;
 
@@ -33,12 +36,14 @@ pub(crate) fn scales(
         let mut cost = scales_cost(&scales, active);
         // Of what hardly bears anything the description is no witness, but for an effort that its drive does not have.
         let torque = sample.torque(model);
-        let most = torque.iter().map(|row| rms(row)).fold(0.0, f64::max);
+        let varies: Vec<f64> = torque.iter().map(|row| spread(row).sqrt()).collect();
+        let most = varies.iter().copied().fold(0.0, f64::max);
         let alone_of = |scales: &[f64], j: usize| scales.iter().filter(|s| **s == scales[j]).count() == 1;
         for j in (0..n).filter(|&j| scales[j] != 1.0).collect::<Vec<_>>() {
             let limit = model.joints()[j].limits.effort.filter(|limit| *limit > 0.0).unwrap_or(f64::INFINITY);
             let impossible = rms(&sample.effort[j]) > 1.2 * limit;
-            if alone_of(&scales, j) && rms(&torque[j]) < 0.04 * most && !impossible {
+            let own = varies[j] > WITNESS * most && (varies[j] > WITNESS * limit || limit == f64::INFINITY);
+            if alone_of(&scales, j) && !own && !impossible {
                 scales[j] = 1.0;
                 (scales, best) = fine_scales(model, sample, scales, active);
                 cost = scales_cost(&scales, active);
@@ -57,11 +62,14 @@ pub(crate) fn scales(
                 (scales, best, cost) = (without, other, other_cost);
             }
         }
-        // The nearest thing to a scale is a robot whose bodies are described badly.
+        // The nearest thing to a scale is a robot whose bodies are described badly; not all of them alike.
         let shared = (0..n).filter(|&j| active[j]).all(|j| scales[j] != 1.0);
-        let wide = weigh(model, sample, &vec![1.0; n], active, Freedom::WIDE);
-        let against = if shared && n > 1 { plain.score } else { plain.score.max(wide.score) };
-        let margin = best.score - cost - against;
+        let margin = if shared && n > 1 {
+            best.score - cost - plain.score
+        } else {
+            let as_logged = weigh_either(model, sample, &vec![1.0; n], active);
+            weigh_either(model, sample, &scales, active).score - cost - as_logged.score
+        };
         let mean = |of: &super::weigh::Weighed| {
             let scaled: Vec<f64> =
                 (0..n).filter(|&j| scales[j] != 1.0).map(|j| of.unexplained[j].min(1.0).ln()).collect();

@@ -5,7 +5,7 @@ use super::decide::{Decision, SURE, left};
 use super::effort::{self, Useless};
 use super::sample::Sample;
 use super::shift::Bar;
-use super::weigh::{Freedom, weigh};
+use super::weigh::{Freedom, weigh, weigh_either};
 use super::words::per_cent;
 use super::{Doubt, Fault, FaultKind, Faults, channels, figure};
 use crate::check::{Logs, Seen};
@@ -63,7 +63,7 @@ pub(crate) fn is_healthy(model: &Model, episodes: &[&Episode]) -> bool {
             episodes.iter().all(known) && logs.traits.iter().any(|traits| traits[j].moves())
         })
         .collect();
-    sample.len() < 30 || weigh(model, &sample, &vec![1.0; model.dof()], &active, Freedom::ORDINARY).is_plain(&active)
+    sample.len() < 30 || weigh_either(model, &sample, &vec![1.0; model.dof()], &active).is_plain(&active)
 }
 
 impl Search {
@@ -108,10 +108,9 @@ impl Search {
                         vec![Change::Unwrap(j, turn)],
                     ));
                 }
-                if let Some(kept) = channels::readings(logs, e) {
-                    let times = logs.episodes[e].len() as f64 / kept.len() as f64;
+                if let Some((kept, times)) = channels::readings(logs, e) {
                     let evidence = format!(
-                        "the positions hold for {} samples on average and then jump: readings come at {} Hz",
+                        "the positions hold for {} samples and then jump: readings come at {} Hz",
                         figure(times),
                         figure(1.0 / (logs.dt[e] * times))
                     );

@@ -16,6 +16,12 @@ const LITTLE: f64 = 2e-3;
 /// An unexplained share below this counts as this.
 const FLOOR: f64 = 1e-3;
 
+/// What a shift of all joints leaves of the effort, squared, at most: this part of what was left, and this in all; and the least
+/// that must have been left. Bristles and play look like a shift that takes two thirds of what is left.
+const TOGETHER: (f64, f64, f64) = (0.25, 0.3, 0.003);
+/// The same of one joint.
+const ONE: (f64, f64, f64) = (0.2, 0.1, 0.04);
+
 /// What is asked of a shift.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bar {
@@ -98,7 +104,7 @@ pub(crate) fn shift(logs: &Logs, model: &Model, sample: &Sample, active: &[bool]
         let share = |found: &super::weigh::Weighed| {
             (group.iter().map(|&j| found.unexplained[j].ln()).sum::<f64>() / group.len() as f64).exp()
         };
-        let (part, most, least_left) = if group.len() == all.len() { (0.4, 0.3, 0.003) } else { (0.2, 0.1, 0.04) };
+        let (part, most, least_left) = if group.len() == all.len() { TOGETHER } else { ONE };
         let (left, now) = (share(&before), share(&after));
         if bar.nothing_else && !after.is_plain(active) {
             continue;

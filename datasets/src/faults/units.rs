@@ -18,10 +18,14 @@ pub(crate) fn position_units(prismatic: bool) -> Vec<(&'static str, f64)> {
 /// Units of time, likewise.
 pub(crate) const CLOCKS: [(&str, f64); 4] = [("ms", 1e3), ("µs", 1e6), ("ns", 1e9), ("minutes", 1.0 / 60.0)];
 
-/// Speed measured over speed derived, over all joints that tell: their median.
+/// Slopes that differ by less than this, as a logarithm, are one.
+const ONE: f64 = 0.05;
+
+/// Speed measured over speed derived, where all joints that tell agree: their median.
 pub(crate) fn velocity_slope(logs: &Logs) -> Option<f64> {
     let clear = |relation: &crate::check::Relation| relation.correlation > 0.95;
     let mut slopes: Vec<f64> =
         logs.relations.iter().flatten().flatten().filter(|r| clear(r)).map(|relation| relation.slope).collect();
-    crate::robust::median(&mut slopes)
+    let slope = crate::robust::median(&mut slopes)?;
+    slopes.iter().all(|other| (other / slope).ln().abs() < ONE).then_some(slope)
 }

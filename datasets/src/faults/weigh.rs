@@ -10,6 +10,8 @@ use nalgebra::{DMatrix, DVector};
 const FLOOR: f64 = 3e-4;
 /// Places count as so many independent ones at most, a joint.
 const MOST_INDEPENDENT: f64 = 120.0;
+/// What it costs, in nats, to take a robot for one that has been used long.
+const WORN: f64 = 3.0;
 /// Rounds of weighing the joints against each other.
 const ROUNDS: usize = 4;
 /// Columns of each joint: bias, viscous and dry friction, rotor, gain.
@@ -31,6 +33,8 @@ impl Freedom {
     pub const ORDINARY: Freedom = Freedom { bodies: 0.07, gain: 0.07, floor: FLOOR };
     /// The same, to tell a size once it is known that there is one: the least bit counts.
     pub const FINE: Freedom = Freedom { floor: 1e-6, ..Freedom::ORDINARY };
+    /// One whose links are off by up to a third.
+    pub const WORN: Freedom = Freedom { bodies: 0.2, gain: 0.1, floor: FLOOR };
     /// One that was described badly.
     pub const WIDE: Freedom = Freedom { bodies: 0.4, gain: 0.1, floor: FLOOR };
 }
@@ -63,6 +67,17 @@ impl Weighed {
     }
 }
 
+/// Weighs an account by the likelier of two robots: a used one, and one that has been used long.
+pub(crate) fn weigh_either(model: &Model, sample: &Sample, scale: &[f64], active: &[bool]) -> Weighed {
+    let ordinary = weigh(model, sample, scale, active, Freedom::ORDINARY);
+    if ordinary.is_plain(active) {
+        return ordinary;
+    }
+    let mut worn = weigh(model, sample, scale, active, Freedom::WORN);
+    worn.score -= WORN;
+    if worn.score > ordinary.score { worn } else { ordinary }
+}
+
 /// Weighs an account: `scale[j]` is what the effort of joint j was multiplied by when it was logged. Joints that are not
 /// `active` have no say.
 pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[bool], freedom: Freedom) -> Weighed {
@@ -72,7 +87,8 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
     let torque = sample.torque(model);
     let target: Vec<Vec<f64>> =
         (0..n).map(|j| sample.effort[j].iter().map(|effort| effort / scale[j]).collect()).collect();
-    let level: Vec<f64> = (0..n).map(|j| level(model, j, &torque[j])).collect();
+    let most = torque.iter().map(|row| rms(row)).fold(0.0, f64::max);
+    let level: Vec<f64> = (0..n).map(|j| level(model, j, &torque[j], most)).collect();
     let slow: Vec<f64> = sample.v.iter().map(|v| 0.1 * rms(v)).collect();
     let columns = |j: usize, k: usize, row: &mut [f64]| {
         let v = sample.v[j][k];
@@ -179,12 +195,14 @@ fn keep_to_physics(model: &Model, solution: &DVector<f64>, ordinary: &[f64], pri
     }
 }
 
-/// What is much torque for a joint: its limit, or the torque that the motion takes.
-fn level(model: &Model, j: usize, torque: &[f64]) -> f64 {
+/// What is much torque for a joint: its limit, or the torque that the motion takes. `most` is what it takes of the joint that
+/// bears most.
+fn level(model: &Model, j: usize, torque: &[f64], most: f64) -> f64 {
     let limit = model.joints()[j].limits.effort.filter(|limit| *limit > 0.0 && limit.is_finite()).unwrap_or(0.0);
-    // A limit far beyond what the motion takes is that of another drive, or none.
+    // A limit far beyond what the motion takes is that of another drive, or none. A wrist that bears next to nothing has the
+    // friction of its drive all the same.
     let taken = rms(torque);
-    limit.min(300.0 * taken).max(2.0 * taken).max(1e-9)
+    limit.min((300.0 * taken).max(most)).max(2.0 * taken).max(1e-9)
 }
 
 /// Standard deviations of all columns.
@@ -218,7 +236,8 @@ fn prior(model: &Model, sample: &Sample, level: &[f64], freedom: Freedom) -> Vec
     prior
 }
 
-fn spread(x: &[f64]) -> f64 {
+/// Variance.
+pub(crate) fn spread(x: &[f64]) -> f64 {
     let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
     x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len().max(1) as f64
 }

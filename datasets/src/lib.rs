@@ -60,6 +60,7 @@ pub use reference::{Excitation, Reference, ReferenceError, ReferenceKind, excita
 pub use resample::{Uniform, derive_velocity, resample};
 pub use sensors::Sensors;
 pub use servo::Servo;
+pub use time_stamps::LONGEST_STEP;
 pub use trajectory::Trajectory;
 pub use transitions::transitions;
 pub use write::write_csv;

@@ -4,7 +4,7 @@ use crate::cli::Input;
 use crate::robot;
 use anyhow::{Context, Result, bail};
 use gapscope_datasets::{
-    Calibration, ColumnMap, Doubt, Episode, Fault, ReadOptions, check_logs, digest, find_faults, mend, read_logs,
+    Calibration, ColumnMap, Doubt, Episode, Fault, LONGEST_STEP, ReadOptions, check_logs, digest, find_faults, mend, read_logs,
 };
 use gapscope_diagnosis::Origin;
 use gapscope_dynamics::{Finding, Model};
@@ -57,9 +57,6 @@ pub fn fault_line(fault: &Fault) -> String {
     format!("{files}{joints}{}. {done}: {}", fault.evidence, fault.mend)
 }
 
-/// Logs whose samples are further apart than this, s, tell nothing of a robot's dynamics.
-const SLOWEST: f64 = 0.5;
-
 /// Reads robot and logs. Joints of which the logs say nothing are held at zero, with a finding.
 ///
 /// # Errors
@@ -97,14 +94,19 @@ fn checked(input: &Input, model: Model, episodes: Vec<Episode>, said: Vec<Findin
     } else {
         mend(&model, &episodes, &found.faults)
     };
-    if let Some(slow) = episodes.iter().find(|episode| episode.dt() > SLOWEST) {
-        bail!(
-            "{}: the median step of time is {} s, too long to tell anything of a robot's dynamics. If the stamps are in ms, \
-             µs or ns, or number the rows, scale them: a --map-file with `[columns]` and below it \
-             `time = {{ column = \"time\", scale = 0.001 }}` for ms",
-            slow.name,
-            slow.dt()
+    let (slow, episodes): (Vec<Episode>, Vec<Episode>) =
+        episodes.into_iter().partition(|episode| episode.dt() > LONGEST_STEP);
+    let left_out = slow.iter().map(|episode| {
+        let message = format!(
+            "the median step of time is {} s, too long to show how a robot moves: left out. If the stamps are in another unit, \
+             scale them: a --map-file with `[columns]` and below it `time = {{ column = \"time\", scale = 0.001 }}` for ms",
+            episode.dt()
         );
+        Finding::new(episode.name.clone(), message)
+    });
+    let said: Vec<Finding> = left_out.chain(said).collect();
+    if let Some(first) = said.first().filter(|_| episodes.is_empty() && !slow.is_empty()) {
+        bail!("{first}");
     }
     // What is held against the model weighs most, what the reader of the robot passed over least.
     let checks = check_logs(&model, &episodes);

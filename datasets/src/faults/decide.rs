@@ -8,6 +8,7 @@ use super::weigh::{Weighed, weigh_either};
 use super::words::{per_cent, phrase};
 use super::{Doubt, Fault, FaultKind};
 use crate::check::Logs;
+use crate::time_stamps::LONGEST_STEP;
 use gapscope_dynamics::Model;
 
 /// Places of the first look.
@@ -24,7 +25,8 @@ const APART: f64 = 6.0;
 const COST: f64 = 5.0;
 /// What a scale of the effort costs beside an account of the motion, in nats: of mirror images, the one without.
 const SCALE_COST: f64 = 8.0;
-/// What a clock gains, in nats, by steps of time that no log has, or by velocities that are all off by its factor.
+/// What a clock gains, in nats, by steps of time that no log has, or by velocities that are all off by its factor; and a unit by
+/// each joint that it brings back from far beyond its limits.
 const BESIDE: f64 = 30.0;
 /// Zeros off by less than this are an effect, rad.
 const ZERO: f64 = 20.0 * std::f64::consts::PI / 180.0;
@@ -34,8 +36,6 @@ const EXPLAINS: f64 = 0.45;
 const NOTABLE: f64 = 0.05;
 /// ... or the log must ask this much more of the robot's bodies and rotors, in nats.
 const MUCH: f64 = 4.0 * SURE;
-/// The usual step of time beyond which a clock cannot be in seconds, s.
-const SLOWEST: f64 = 0.2;
 
 /// How much of the effort an account leaves, as a geometric mean over the joints that count.
 pub(crate) fn left(weighed: &Weighed, active: &[bool]) -> f64 {
@@ -69,11 +69,12 @@ impl Decision<'_> {
             active,
             moves: &moves,
             range: range.collect(),
-            slow: logs.dt.iter().any(|dt| *dt > SLOWEST),
+            slow: logs.dt.iter().any(|dt| *dt > LONGEST_STEP),
             velocity: motion::velocity_slope(logs),
         };
         let logged = self.weighed(self.model, sample, active);
-        if logged.0.is_plain(active) && !scene.slow && !scene.velocity_asks() {
+        let plain = logged.0.is_plain(active) && scene.far(&scene.range) == 0;
+        if plain && !scene.slow && !scene.velocity_asks() {
             return None;
         }
         let base = scene.as_logged();
@@ -95,7 +96,8 @@ impl Decision<'_> {
                 let beside = match account.kind {
                     Kind::Clock if slow => BESIDE,
                     Kind::Clock if scene.velocity_says(account.value) => BESIDE,
-                    _ => 0.0,
+                    // Positions that no robot reaches, and would with it.
+                    _ => BESIDE * f64::from(account.inside),
                 };
                 // Another size of gravity is another planet: a clock is the likelier account.
                 let size = account.kind == Kind::Gravity && (account.value - 1.0).abs() > 0.1;
@@ -131,10 +133,12 @@ impl Decision<'_> {
         let bent = match account.kind {
             Kind::Clock => slow || asks > SURE || (scene.velocity_says(account.value) && after < 1.1 * before),
             Kind::Zero | Kind::Sign | Kind::Axis => asks > 2.0 * SURE,
+            Kind::Scale => account.inside > 0 && after < 1.1 * before,
             _ => false,
         };
         let clearly = after < 0.1 && after < 0.2 * before;
         let notable = account.kind == Kind::Clock
+            || account.inside > 0
             || asks > MUCH
             || (0..n).any(|j| active[j] && logged.0.unexplained[j] > NOTABLE);
         let explains = after < most && (after < 0.6 * before && (0..n).any(tells) || clearly || bent);
@@ -200,7 +204,6 @@ impl Decision<'_> {
         let factor = (account.kind != Kind::Order).then_some(account.value);
         let mut fault =
             Fault::new(logs, kind, &account.joints, &all, factor, evidence, with_velocities(logs, &account.changes));
-        fault.left = Some(after / before);
         fault.gravity = account.gravity.map(|gravity| gravity.to_array());
         fault
     }

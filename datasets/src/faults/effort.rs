@@ -1,7 +1,7 @@
 //! What is wrong with the effort by itself: not recorded, noise, without its sign, cut off, in another unit, late.
 
 use super::sample::Sample;
-use super::weigh::{Freedom, Weighed, weigh, weigh_either};
+use super::weigh::{Freedom, Weighed, spread, weigh, weigh_either};
 use crate::check::{Fit, Logs, fit};
 use crate::robust::rms;
 use gapscope_dynamics::Model;
@@ -20,8 +20,32 @@ pub(crate) enum Useless {
     Noise,
 }
 
-/// What is unusable about a joint's effort in one log, if anything. `torque` is what the model takes for the motion.
-pub(crate) fn useless(logs: &Logs, e: usize, j: usize, torque: &[f64]) -> Option<Useless> {
+/// The joints of one log whose effort cannot be used, with why. `torque` is what the model takes for the motion.
+///
+/// Of a joint that hardly bears anything, noise may be all that there is to log: it counts beside a joint that bears more.
+pub(crate) fn useless_joints(logs: &Logs, e: usize, torque: &[Vec<f64>]) -> Vec<(usize, Useless)> {
+    let noise: Vec<Option<Noise>> = (0..torque.len()).map(|j| noise(logs, e, j, &torque[j])).collect();
+    let any = noise.iter().flatten().any(|noise| *noise == Noise::Shows);
+    let of = |(j, noise): (usize, &Option<Noise>)| match noise {
+        Some(Noise::Never(value)) => Some((j, Useless::Constant(*value))),
+        Some(Noise::Shows | Noise::MayBe) if any => Some((j, Useless::Noise)),
+        _ => None,
+    };
+    noise.iter().enumerate().filter_map(of).collect()
+}
+
+/// What an effort looks like from sample to sample, where it looks like no torque.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Noise {
+    /// It never changes; its value.
+    Never(f64),
+    /// It is white where there is a torque to log.
+    Shows,
+    /// It is white.
+    MayBe,
+}
+
+fn noise(logs: &Logs, e: usize, j: usize, torque: &[f64]) -> Option<Noise> {
     let (episode, traits) = (logs.episodes[e], &logs.traits[e][j]);
     let effort = &episode.effort[j];
     if !traits.moves() || episode.effort_unknown.contains(&j) {
@@ -29,7 +53,7 @@ pub(crate) fn useless(logs: &Logs, e: usize, j: usize, torque: &[f64]) -> Option
     }
     let first = *effort.first()?;
     if effort.iter().all(|x| *x == first) {
-        return Some(Useless::Constant(first));
+        return Some(Noise::Never(first));
     }
     // White from sample to sample, and nothing is left of it in the mean.
     let mean = effort.iter().sum::<f64>() / effort.len() as f64;
@@ -38,14 +62,14 @@ pub(crate) fn useless(logs: &Logs, e: usize, j: usize, torque: &[f64]) -> Option
         effort.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum::<f64>() / effort.len() as f64;
     let block = 25.min(effort.len() / 10).max(1);
     let means: Vec<f64> = effort.chunks_exact(block).map(|c| c.iter().sum::<f64>() / block as f64 - mean).collect();
-    let white = with_next.abs() < 0.15 * variance && rms(&means).powi(2) < 2.0 * variance / block as f64;
-    // Of a joint that hardly bears anything, noise may be all that there is to log.
-    let level = torque.iter().sum::<f64>() / torque.len().max(1) as f64;
-    let taken = torque.iter().map(|x| (x - level).powi(2)).sum::<f64>() / torque.len().max(1) as f64;
+    if with_next.abs() > 0.15 * variance || rms(&means).powi(2) > 2.0 * variance / block as f64 || means.len() < 9 {
+        return None;
+    }
+    let taken = spread(torque);
     let limit = logs.model.joints()[j].limits.effort.filter(|limit| *limit > 0.0).unwrap_or(f64::INFINITY);
     let shows = taken > variance / block as f64 || variance.sqrt() > 0.2 * limit;
     let absent = rms(&means).powi(2) < 0.3 * taken + 1.5 * variance / block as f64;
-    (white && means.len() > 8 && shows && absent && variance > taken).then_some(Useless::Noise)
+    Some(if shows && absent && variance > taken { Noise::Shows } else { Noise::MayBe })
 }
 
 /// Whether a joint whose effort is zero throughout is driven by nothing: then what the motion takes by the model is far
@@ -56,18 +80,25 @@ pub(crate) fn is_passive(model: &Model, sample: &Sample, j: usize) -> bool {
     rms(&torque[j]) < 0.25 * rms(&weight[j]).max(rms(&inertia))
 }
 
-/// Whether a joint's effort has lost its sign: never negative, down to zero again and again, and like the model's only in size.
-pub(crate) fn is_absolute(logs: &Logs, sample: &Sample, torque: &[Vec<f64>], j: usize) -> bool {
+/// Which of some joints have efforts that lost their sign: never negative, down to zero again and again, and like the model's
+/// only in size. Beside one of which that is clear, the first two are enough.
+pub(crate) fn absolute_joints(logs: &Logs, sample: &Sample, torque: &[Vec<f64>], joints: &[usize]) -> Vec<usize> {
+    let folded: Vec<usize> = joints.iter().copied().filter(|j| is_folded(logs, *j)).collect();
+    if folded.iter().any(|j| is_absolute(sample, torque, *j)) { folded } else { Vec::new() }
+}
+
+/// Whether a joint's effort is never negative, or never positive, and down to zero again and again, while the joint reverses.
+fn is_folded(logs: &Logs, j: usize) -> bool {
     let all = || logs.episodes.iter().flat_map(|episode| episode.effort[j].iter().copied());
     let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     let size = high.abs().max(low.abs());
     let one_sided = low >= -1e-3 * size || high <= 1e-3 * size;
     let near_zero = all().filter(|x| x.abs() < 0.04 * size).count() as f64 > 0.005 * all().count() as f64;
-    if !(one_sided && near_zero && size > 0.0) {
-        return false;
-    }
-    let plain = explained(sample, torque, j);
-    let Some(plain) = plain else { return false };
+    one_sided && near_zero && size > 0.0
+}
+
+fn is_absolute(sample: &Sample, torque: &[Vec<f64>], j: usize) -> bool {
+    let Some(plain) = explained(sample, torque, j) else { return false };
     // The torque with its friction, made from what has a sign, then without.
     let friction = |k: usize| sample.v[j][k].signum();
     let best = (0..12)

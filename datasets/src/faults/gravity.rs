@@ -19,6 +19,7 @@ impl Scene<'_> {
             changes: Vec::new(),
             gravity: Some(gravity),
             value: gravity.length() / size,
+            inside: 0,
             look: self.look(&self.model.clone().with_gravity(gravity), self.sample, &self.range),
         };
         let coarse: Vec<Account> = [-down, x, -x, y, -y, DVec3::ZERO, down * 2.0, down * 0.5]

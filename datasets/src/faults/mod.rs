@@ -11,6 +11,7 @@ mod determined;
 mod effort;
 mod gravity;
 mod motion;
+mod odd;
 mod order;
 mod sample;
 mod scale;
@@ -26,7 +27,6 @@ use crate::episode::Episode;
 use change::Change;
 pub use determined::determined;
 use gapscope_dynamics::Model;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What is wrong.
@@ -73,23 +73,6 @@ pub enum FaultKind {
     Gravity,
 }
 
-impl FaultKind {
-    /// Whether a log shows it without the model.
-    fn shows_by_itself(self) -> bool {
-        use FaultKind::*;
-        matches!(
-            self,
-            RepeatedSamples
-                | PositionWrapped
-                | PositionIsCommand
-                | VelocityScale
-                | VelocitySign
-                | EffortMissing
-                | EffortNoise
-        )
-    }
-}
-
 /// Something that is wrong with the data beyond doubt.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
@@ -111,9 +94,6 @@ pub struct Fault {
     pub mended: bool,
     #[serde(skip)]
     changes: Vec<Change>,
-    /// Share of the effort, squared, that the mended logs leave over that of the logs as they are, where the model told it.
-    #[serde(skip)]
-    left: Option<f64>,
     /// Gravity of the mended model, m/s².
     #[serde(skip)]
     gravity: Option<[f64; 3]>,
@@ -156,7 +136,7 @@ impl Fault {
         let mended = !changes.iter().any(|change| matches!(change, Change::NoEffort(_)));
         let mend = words::mend_words(kind, factor, mended);
         let joints = joints.iter().map(name).collect();
-        Fault { kind, joints, files, factor, evidence, mend, mended, changes, left: None, gravity: None }
+        Fault { kind, joints, files, factor, evidence, mend, mended, changes, gravity: None }
     }
 
     /// Whether nothing mends it but leaving out the effort of its joints.
@@ -170,85 +150,12 @@ impl Fault {
     }
 }
 
-/// Factors that logs show one by one are the same where they differ by less than this part: one log tells them less well
-/// than all together.
-const ALIKE: f64 = 0.3;
-
-/// One log says by itself what is wrong where its mend takes all but this part of what is left.
-const GLARING: f64 = 0.05;
-
-/// Looks for faults in logs, all together and each by itself.
+/// Looks for faults in logs. All logs are taken to have the same ones, but for a log that is not like the others.
 ///
 /// At most some hundred places of all logs are held against the model, so that the cost is that of reading the logs once or
 /// twice. Episodes whose joints are not those of the model, by count, are passed over.
 pub fn find_faults(model: &Model, episodes: &[Episode]) -> Faults {
-    let together = search::search(model, &episodes.iter().collect::<Vec<_>>(), false);
-    if episodes.len() < 2 {
-        return together;
-    }
-    // One log that differs shows where the logs, mended as all of them ask for, are still not those of the model.
-    let healthy = |model: &Model, episodes: &[Episode]| -> Vec<bool> {
-        episodes.par_iter().map(|episode| search::is_healthy(model, &[episode])).collect()
-    };
-    let (mended_model, mended) = mend(model, episodes, &together.faults);
-    let once_mended = healthy(&mended_model, &mended);
-    if once_mended.iter().all(|healthy| *healthy) {
-        return together;
-    }
-    let as_logged = healthy(model, episodes);
-    let mut alone: Vec<Faults> = episodes.par_iter().map(|episode| search::search(model, &[episode], true)).collect();
-    // What one log shows by itself counts where nothing is odd once it is undone.
-    for (found, episode) in alone.iter_mut().zip(episodes) {
-        let (model, mended) = mend(model, std::slice::from_ref(episode), &found.faults);
-        if !search::is_healthy(&model, &mended.iter().collect::<Vec<_>>()) {
-            found.faults.retain(|fault| fault.kind.shows_by_itself());
-        }
-    }
-    // On another clock a velocity looks like one in another unit.
-    if together.faults.iter().any(|fault| fault.kind == FaultKind::TimeScale) {
-        let of_velocity = |fault: &Fault| matches!(fault.kind, FaultKind::VelocityScale | FaultKind::VelocitySign);
-        alone.iter_mut().for_each(|found| found.faults.retain(|fault| !of_velocity(fault)));
-    }
-    let same = |a: &Fault, b: &Fault| {
-        let near = match (a.factor, b.factor) {
-            (Some(a), Some(b)) => (a - b).abs() <= ALIKE * a.abs().max(b.abs()),
-            _ => true,
-        };
-        a.kind == b.kind && a.joints == b.joints && near
-    };
-    // What all show together holds for all, unless a log was healthy and no longer is, or has something else by itself.
-    let denied = |fault: &Fault| {
-        (0..episodes.len()).any(|e| {
-            let own = &alone[e].faults;
-            (as_logged[e] && !once_mended[e] && fault.files.is_empty())
-                || (!own.is_empty() && !own.iter().any(|other| same(fault, other)))
-        })
-    };
-    let mut faults: Vec<Fault> = together.faults.iter().filter(|fault| !denied(fault)).cloned().collect();
-    let mut single: Vec<(Fault, Vec<usize>)> = Vec::new();
-    for (e, found) in alone.iter().enumerate() {
-        for fault in found.faults.iter().filter(|fault| !faults.iter().any(|other| same(fault, other))) {
-            match single.iter_mut().find(|(other, _)| same(fault, other)) {
-                Some((_, logs)) => logs.push(e),
-                None => single.push((fault.clone(), vec![e])),
-            }
-        }
-    }
-    let mut doubts = if faults.is_empty() { together.doubts } else { Vec::new() };
-    for (fault, logs) in single {
-        // One log differs from others that are as they should be; where none is, what each shows is no more than a question.
-        let others = (0..episodes.len()).all(|e| logs.contains(&e) || as_logged[e] || once_mended[e]);
-        let files: Vec<String> = logs.iter().map(|&e| episodes[e].name.clone()).collect();
-        let of_all = logs.len() == episodes.len();
-        let glaring = fault.kind.shows_by_itself() || fault.left.is_some_and(|left| left < GLARING);
-        if (others || of_all || glaring) && (of_all || fault.gravity.is_none()) {
-            faults.push(Fault { files: if of_all { Vec::new() } else { files }, ..fault });
-        } else {
-            let question = format!("{}: {}?", files.join(", "), fault.evidence);
-            doubts.push(Doubt { question, joints: fault.joints, effects: Vec::new() });
-        }
-    }
-    Faults { faults, doubts }
+    search::search(model, &episodes.iter().collect::<Vec<_>>())
 }
 
 /// The logs and the model with their faults undone.

@@ -14,6 +14,8 @@ use std::f64::consts::PI;
 const FLOOR: f64 = 4e-3;
 /// What positions beyond the URDF's limits count, a joint, in the unit of [`look`].
 const BEYOND: f64 = 0.7;
+/// Positions that pass the limits by more spans than this cannot be.
+const FAR: f64 = 3.0;
 /// What a clock counts that a measured velocity speaks against.
 const AGAINST_VELOCITY: f64 = 2.0;
 
@@ -60,6 +62,8 @@ pub(crate) struct Account {
     pub gravity: Option<DVec3>,
     /// What was logged over what is true; the zero's place for zeros, rad or m.
     pub value: f64,
+    /// Joints that lie far beyond their limits as logged, less those that do so under it.
+    pub inside: i32,
     /// First look: the sum of the logarithms of what is left of each joint's effort. The lower the better.
     pub look: f64,
 }
@@ -105,8 +109,8 @@ impl Scene<'_> {
         self.velocity_asks() && self.velocity.is_some_and(|slope| (slope.abs() / logged).ln().abs() < AGREES)
     }
 
-    /// The look of changed positions and time.
-    fn changed(&self, changes: &[Change]) -> f64 {
+    /// The look of changed positions and time, and how many joints more are then within their limits.
+    fn changed(&self, changes: &[Change]) -> (f64, i32) {
         let mut sample = self.sample.clone();
         let mut range = self.range.clone();
         let mut against = 0.0;
@@ -130,12 +134,17 @@ impl Scene<'_> {
                 _ => {}
             }
         }
-        self.look(self.model, &sample, &range) + against
+        (self.look(self.model, &sample, &range) + against, self.far(&self.range) - self.far(&range))
+    }
+
+    /// How many joints lie where they cannot be.
+    pub fn far(&self, range: &[(f64, f64)]) -> i32 {
+        (0..self.model.dof()).map(|j| i32::from(past(self.model, j, range[j]) > FAR)).sum()
     }
 
     fn account(&self, kind: Kind, joints: Vec<usize>, changes: Vec<Change>, value: f64) -> Account {
-        let look = self.changed(&changes);
-        Account { kind, joints, changes, gravity: None, value, look }
+        let (look, inside) = self.changed(&changes);
+        Account { kind, joints, changes, gravity: None, value, inside, look }
     }
 
     /// The best accounts, one or two of each kind.
@@ -306,10 +315,15 @@ fn refined(mut best: Account, mut step: f64, moved: impl Fn(f64, f64) -> f64, at
 }
 
 /// 1 where positions pass the limits by a good part of their span, 0 elsewhere.
-fn beyond(model: &Model, j: usize, (low, high): (f64, f64)) -> f64 {
+fn beyond(model: &Model, j: usize, range: (f64, f64)) -> f64 {
+    f64::from(u8::from(past(model, j, range) > 0.15))
+}
+
+/// How far positions pass a joint's limits, over their span; 0 where it has none.
+fn past(model: &Model, j: usize, (low, high): (f64, f64)) -> f64 {
     let joint = &model.joints()[j];
     let limits = joint.limits.lower.zip(joint.limits.upper).filter(|_| joint.kind != JointKind::Continuous);
-    let past =
-        limits.is_some_and(|(lower, upper)| upper > lower && (lower - low).max(high - upper) > 0.15 * (upper - lower));
-    f64::from(u8::from(past))
+    limits
+        .filter(|(lower, upper)| upper > lower)
+        .map_or(0.0, |(lower, upper)| (lower - low).max(high - upper).max(0.0) / (upper - lower))
 }

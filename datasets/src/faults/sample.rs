@@ -6,7 +6,7 @@ use gapscope_dynamics::{Data, Model};
 
 /// Places looked at over all logs, however long they are.
 const PLACES: usize = 420;
-/// Places in each log at least.
+/// Places in each log at least, where there are few logs; all together are no more than twenty times that.
 const LEAST_PLACES: usize = 60;
 /// Second differences stand out of the position's noise by this much, where the motion is slow enough.
 const CLEAR: f64 = 25.0;
@@ -45,7 +45,8 @@ impl Sample {
             let width = window(logs, e);
             let room = episode.len().saturating_sub(2 * width + 1);
             let share = (PLACES as f64 * episode.duration() / total.max(1e-12)).ceil() as usize;
-            let hop = (room / share.max(LEAST_PLACES)).max(width / 2).max(1);
+            let least = LEAST_PLACES.min(20 * LEAST_PLACES / logs.episodes.len()).max(1);
+            let hop = (room / share.max(least)).max(width / 2).max(1);
             let time = &episode.time;
             for k in (0..room).step_by(hop) {
                 let tent = [time[k], time[k + width], time[k + 2 * width]];
@@ -90,6 +91,11 @@ impl Sample {
     /// Every `stride`-th place.
     pub fn thinned(&self, stride: usize) -> Sample {
         self.kept(|k| k % stride == 0)
+    }
+
+    /// The places outside of one log.
+    pub fn without(&self, log: usize) -> Sample {
+        self.kept(|k| self.log[k] != log)
     }
 
     fn kept(&self, keep: impl Fn(usize) -> bool) -> Sample {

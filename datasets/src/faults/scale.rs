@@ -180,9 +180,7 @@ fn said(
         );
         let kind = if turned { FaultKind::EffortSign } else { FaultKind::EffortScale };
         let changes = group.iter().map(|&j| Change::Effort(j, 1.0 / scale)).collect();
-        let mut fault = Fault::new(logs, kind, &group, &all, Some(scale), evidence, changes);
-        fault.left = Some(share(best) / share(plain));
-        found.push(Ok(fault));
+        found.push(Ok(Fault::new(logs, kind, &group, &all, Some(scale), evidence, changes)));
     }
     found
 }

@@ -70,7 +70,11 @@ impl Decision<'_> {
         } else {
             near.extend(motion::CLOCKS.iter().map(|(_, factor)| *factor));
         }
-        let reach = if add { 0.12 } else { 0.05 };
+        let reach = match account.kind {
+            Kind::Zero => 0.12,
+            Kind::Clock => 0.15,
+            _ => 0.05,
+        };
         let off = |value: f64| if add { (value - best.1.value).abs() } else { (value / best.1.value).ln().abs() };
         let named = near.into_iter().filter(|value| *value != 0.0 && off(*value) < reach).map(&at);
         if let Some(named) = named.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|named| named.0 > best.0 - NAMED) {

@@ -19,8 +19,6 @@ const FLOOR: f64 = 1e-3;
 /// What a shift of all joints leaves of the effort, squared, at most: this part of what was left, and this in all; and the least
 /// that must have been left. Bristles and play look like a shift that takes two thirds of what is left.
 const TOGETHER: (f64, f64, f64) = (0.25, 0.3, 0.003);
-/// The same of one joint.
-const ONE: (f64, f64, f64) = (0.2, 0.1, 0.04);
 
 /// What is asked of a shift.
 #[derive(Debug, Clone, Copy)]
@@ -29,13 +27,11 @@ pub(crate) struct Bar {
     pub least: f64,
     /// By how many nats it is likelier than none.
     pub sure: f64,
-    /// Whether one log speaks for itself alone: of one joint it says too little.
-    pub alone: bool,
     /// Whether nothing else may be wrong once it is undone.
     pub nothing_else: bool,
 }
 
-/// A shift that leaves no doubt: of all joints together, or of one.
+/// A shift of all joints that leaves no doubt. Of one joint by itself it is hardly ever one: topics are merged as wholes.
 pub(crate) fn shift(logs: &Logs, model: &Model, sample: &Sample, active: &[bool], bar: Bar) -> Option<Fault> {
     let n = model.dof();
     let ones = vec![1.0; n];
@@ -49,79 +45,70 @@ pub(crate) fn shift(logs: &Logs, model: &Model, sample: &Sample, active: &[bool]
     let longest = LONGEST.min(shortest / 8.0);
     let step = (bar.least / 3.0).max(logs.dt.iter().copied().fold(0.0, f64::max));
     let steps = (longest / step) as i32;
-    let left_at = |later: f64| -> Vec<f64> {
+    let group: Vec<usize> = (0..n).filter(|&j| active[j]).collect();
+    let left_at = |later: f64| -> f64 {
         let effort = sample.effort_after(logs, later);
-        let left = |j: usize| fit(&effort[j], &torque[j], &sample.v[j], None).map_or(1.0, |fit| fit.unexplained);
-        (0..n).map(|j| if active[j] { left(j).max(FLOOR).ln() } else { 0.0 }).collect()
+        let left = |j: &usize| {
+            fit(&effort[*j], &torque[*j], &sample.v[*j], None).map_or(1.0, |fit| fit.unexplained).max(FLOOR).ln()
+        };
+        group.iter().map(left).sum()
     };
-    let table: Vec<(f64, Vec<f64>)> = (-steps..=steps).map(|i| f64::from(i) * step).map(|t| (t, left_at(t))).collect();
-    let all: Vec<usize> = (0..n).filter(|&j| active[j]).collect();
-    let mut groups = vec![all.clone()];
-    // One log of several says too little of one joint.
-    if all.len() > 1 && !bar.alone && !bar.nothing_else {
-        groups.extend(all.iter().map(|&j| vec![j]));
-    }
-    let as_logged = left_at(0.0);
-    for group in groups {
-        let sum = |row: &[f64]| group.iter().map(|&j| row[j]).sum::<f64>();
-        let (coarse, _) = table.iter().min_by(|a, b| sum(&a.1).total_cmp(&sum(&b.1)))?;
-        let (mut best, mut width) = (*coarse, 0.5 * step);
-        let mut lowest = sum(&left_at(best));
-        for _ in 0..7 {
-            for other in [best - width, best + width] {
-                let now = sum(&left_at(other));
-                if now < lowest {
-                    (best, lowest) = (other, now);
-                }
-            }
-            width *= 0.5;
-        }
-        let gained = sum(&as_logged) - lowest;
-        if best.abs() < bar.least || gained < 0.7 || best.abs() > 0.97 * longest {
-            continue;
-        }
-        let moved = |later: f64| {
-            let mut moved = sample.clone();
-            let effort = sample.effort_after(logs, later);
-            group.iter().for_each(|&j| moved.effort[j].clone_from(&effort[j]));
-            moved
-        };
-        let at = |later: f64| (later, weighed(&moved(later), Freedom::FINE).score);
-        // The first look lets friction be anything, which moves a shift; a robot's own friction does not.
-        let (mut now, mut width) = (at(best), 2.0 * step);
-        for _ in 0..STEPS {
-            let around = [at(now.0 - width), at(now.0 + width)];
-            match around.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some(better) if better.1 > now.1 => now = better,
-                _ => width *= 0.5,
+    let table = (-steps..=steps).map(|i| f64::from(i) * step).map(|later| (left_at(later), later));
+    let (mut lowest, mut best) = table.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let mut width = 0.5 * step;
+    for _ in 0..7 {
+        for other in [best - width, best + width] {
+            let now = left_at(other);
+            if now < lowest {
+                (best, lowest) = (other, now);
             }
         }
-        let best = now.0;
-        let after = weighed(&moved(best), Freedom::ORDINARY);
-        if best.abs() < bar.least || best.abs() > 0.97 * longest {
-            continue;
-        }
-        let share = |found: &super::weigh::Weighed| {
-            (group.iter().map(|&j| found.unexplained[j].ln()).sum::<f64>() / group.len() as f64).exp()
-        };
-        let (part, most, least_left) = if group.len() == all.len() { TOGETHER } else { ONE };
-        let (left, now) = (share(&before), share(&after));
-        if bar.nothing_else && !after.is_plain(active) {
-            continue;
-        }
-        if after.score - before.score < bar.sure || now > part * left || now > most || left < least_left {
-            continue;
-        }
-        let (late, side) = if best > 0.0 { (best, "later") } else { (-best, "earlier") };
-        let evidence = format!(
-            "the effort comes {} ms {side} than the motion that it makes: the model then leaves {} % of it, squared, not {} %",
-            figure(1e3 * late),
-            figure(100.0 * now),
-            figure(100.0 * left)
-        );
-        let changes = group.iter().map(|&j| Change::Late(j, best)).collect();
-        let files: Vec<usize> = (0..logs.episodes.len()).collect();
-        return Some(Fault::new(logs, FaultKind::TimeShift, &group, &files, Some(best), evidence, changes));
+        width *= 0.5;
     }
-    None
+    let gained = left_at(0.0) - lowest;
+    if best.abs() < bar.least || gained < 0.7 || best.abs() > 0.97 * longest {
+        return None;
+    }
+    let moved = |later: f64| {
+        let mut moved = sample.clone();
+        let effort = sample.effort_after(logs, later);
+        group.iter().for_each(|&j| moved.effort[j].clone_from(&effort[j]));
+        moved
+    };
+    let at = |later: f64| (later, weighed(&moved(later), Freedom::FINE).score);
+    // The first look lets friction be anything, which moves a shift; a robot's own friction does not.
+    let (mut now, mut width) = (at(best), 2.0 * step);
+    for _ in 0..STEPS {
+        let around = [at(now.0 - width), at(now.0 + width)];
+        match around.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some(better) if better.1 > now.1 => now = better,
+            _ => width *= 0.5,
+        }
+    }
+    let best = now.0;
+    let after = weighed(&moved(best), Freedom::ORDINARY);
+    if best.abs() < bar.least || best.abs() > 0.97 * longest {
+        return None;
+    }
+    let share = |found: &super::weigh::Weighed| {
+        (group.iter().map(|&j| found.unexplained[j].ln()).sum::<f64>() / group.len() as f64).exp()
+    };
+    let (part, most, least_left) = TOGETHER;
+    let (left, now) = (share(&before), share(&after));
+    if bar.nothing_else && !after.is_plain(active) {
+        return None;
+    }
+    if after.score - before.score < bar.sure || now > part * left || now > most || left < least_left {
+        return None;
+    }
+    let (late, side) = if best > 0.0 { (best, "later") } else { (-best, "earlier") };
+    let evidence = format!(
+        "the effort comes {} ms {side} than the motion that it makes: the model then leaves {} % of it, squared, not {} %",
+        figure(1e3 * late),
+        figure(100.0 * now),
+        figure(100.0 * left)
+    );
+    let changes = group.iter().map(|&j| Change::Late(j, best)).collect();
+    let files: Vec<usize> = (0..logs.episodes.len()).collect();
+    Some(Fault::new(logs, FaultKind::TimeShift, &group, &files, Some(best), evidence, changes))
 }

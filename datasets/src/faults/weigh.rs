@@ -54,6 +54,8 @@ pub(crate) struct Weighed {
     pub gain_error: Vec<f64>,
     /// Standard deviation of every column of the fit over that before it: of the links' parameters, then of what [`OWN`] says.
     pub narrowed: Vec<f64>,
+    /// Mass of the robot over that of its description.
+    pub mass: f64,
     /// What it makes of the effort, joint-major, N m or N.
     pub predicted: Vec<Vec<f64>>,
 }
@@ -129,7 +131,7 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
     let worth = independent / places.max(1) as f64;
     let mut noise: Vec<f64> = variance.iter().map(|v| (0.1 * v).max(1e-300)).collect();
     let mut solution = DVector::zeros(width);
-    let mut inverse = DMatrix::zeros(0, 0);
+    let mut last = None;
     let mut unexplained = vec![1.0; n];
     for _ in 0..ROUNDS {
         let mut sum = DMatrix::from_diagonal(&DVector::from_iterator(width, prior.iter().map(|s| s.powi(-2))));
@@ -146,7 +148,7 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
         }
         let Some(factor) = sum.cholesky() else { break };
         solution = factor.solve(&b.component_mul(&size)).component_mul(&size);
-        inverse = factor.inverse();
+        last = Some(factor);
         keep_to_physics(model, &solution, &ordinary, &mut prior, freedom);
         for j in (0..n).filter(|&j| active[j]) {
             let left = squares[j] - 2.0 * solution.dot(&right[j]) + solution.dot(&(&normal[j] * &solution));
@@ -155,6 +157,7 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
             noise[j] = unexplained[j] * variance[j].max(1e-300);
         }
     }
+    let inverse = last.map_or_else(|| DMatrix::zeros(0, 0), |factor| factor.inverse());
     let asked: f64 = solution.iter().zip(&prior).map(|(x, s)| 0.5 * (x / s).powi(2)).sum();
     let likelihood: f64 = (0..n).filter(|&j| active[j]).map(|j| -0.5 * independent * unexplained[j].ln()).sum();
     let gain_at = |j: usize| 10 * n + OWN * j + 4;
@@ -166,8 +169,11 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
         };
         (0..places).map(at).collect()
     });
+    let described: f64 = model.joints().iter().map(|joint| joint.inertia.mass.abs()).sum();
+    let further: f64 = (0..n).map(|j| solution[10 * j]).sum();
     Weighed {
         score: likelihood - asked,
+        mass: 1.0 + further / described.max(1e-9),
         asked,
         unexplained,
         gain: (0..n).map(|j| 1.0 + solution[gain_at(j)]).collect(),

@@ -54,7 +54,7 @@ fn impossible(effect: &FoundEffect, model: &Model) -> Option<String> {
             let lightest = -(1.0 - LIGHTEST) * of.inertia.mass;
             match parameter.as_str() {
                 "mass" | "mass_delta" if value < lightest => {
-                    return Some(format!("the link of {name} would keep next to nothing of its mass"));
+                    return Some(format!("the link of {name} would keep less than a third of its mass"));
                 }
                 "mass" if robot > 0.0 && value > robot => {
                     return Some(format!("{value:.3} kg is more than the robot's own {robot:.3} kg"));

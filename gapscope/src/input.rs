@@ -4,7 +4,8 @@ use crate::cli::Input;
 use crate::robot;
 use anyhow::{Context, Result, bail};
 use gapscope_datasets::{
-    Calibration, ColumnMap, Doubt, Episode, Fault, LONGEST_STEP, ReadOptions, check_logs, digest, find_faults, mend, read_logs,
+    Calibration, ColumnMap, Doubt, Episode, Fault, LONGEST_STEP, ReadOptions, check_logs, digest, find_faults, mend,
+    read_logs,
 };
 use gapscope_diagnosis::Origin;
 use gapscope_dynamics::{Finding, Model};

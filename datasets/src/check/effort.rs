@@ -166,7 +166,9 @@ fn remove(column: &mut [f64], base: &[Vec<f64>]) {
 pub(super) fn check(logs: &Logs, scale: Option<&[f64]>, report: &mut Report) {
     let n = logs.model.dof();
     let mut constant = Vec::new();
-    for j in 0..n {
+    // What was left out has been said already.
+    let known = |j: &usize| !logs.episodes.iter().any(|episode| episode.effort_unknown.contains(j));
+    for j in (0..n).filter(known) {
         let ranges: Vec<(f64, f64)> = logs.episodes.iter().map(|episode| range(&episode.effort[j])).collect();
         if ranges.iter().all(|(low, high)| low == high) {
             constant.extend(ranges.iter().enumerate().map(|(e, (low, _))| Case { episode: e, joint: j, value: *low }));

@@ -38,13 +38,7 @@ pub(crate) fn odd_ones(model: &Model, sample: &Sample, active: &[bool]) -> Vec<u
 }
 
 /// Whether a log is like the others once it is mended. `logged` and `mended` are all logs before and after.
-pub(crate) fn is_like_the_others(
-    model: &Model,
-    logged: &Sample,
-    mended: &Sample,
-    log: usize,
-    active: &[bool],
-) -> bool {
+pub(crate) fn is_like_the_others(model: &Model, logged: &Sample, mended: &Sample, log: usize, active: &[bool]) -> bool {
     let others = left(model, &mended.without(log), active).0;
     let (before, after) = (left(model, logged, active).0, left(model, mended, active).0);
     after - others < (1.0 - TAKEN) * (before - others)

@@ -15,6 +15,8 @@ const SURE: f64 = 12.0;
 /// A joint is a witness of its own scale where the model's torque changes by this part of the limit, and of that of the joint
 /// where it changes most: below, friction and what hangs on the drive make most of its effort.
 const WITNESS: f64 = 0.04;
+/// A factor that is known no better than this, relative, is no mend: a robot's gains alone differ by 0.07.
+const KNOWN: f64 = 0.055;
 /// A log cuts the effort off where the motion shows it to go on by this part beyond.
 const CUT: f64 = 0.08;
 
@@ -154,6 +156,17 @@ fn said(
             continue;
         }
         let names: Vec<&str> = group.iter().map(|&j| logs.model.joints()[j].name.as_str()).collect();
+        if error > KNOWN && unit.is_none() && !turned {
+            found.push(Err(Doubt {
+                question: format!(
+                    "is the effort of {} in N m (N)? It is far from what the model takes, and too little of the motion tells by how much",
+                    names.join(", ")
+                ),
+                joints: names.iter().map(|name| (*name).to_owned()).collect(),
+                effects: Vec::new(),
+            }));
+            continue;
+        }
         let what = match &unit {
             _ if turned => "has the opposite sign to the model's torque".to_owned(),
             Some((name, factor)) => format!("is in {name}: {} times N m (N)", figure(*factor)),

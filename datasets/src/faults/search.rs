@@ -21,9 +21,9 @@ const STRANGE: f64 = 0.5;
 const STRONG: f64 = 2.0;
 /// What the model says is wrong is beyond doubt where the mended logs leave less than this of the effort, squared.
 const SETTLED: f64 = 0.1;
-/// A robot whose mass is outside of these parts of the described one may be another, or be logged in other units: links are off
-/// by a third, and a payload weighs as much as the robot at most.
-const MASS: (f64, f64) = (0.5, 2.0);
+/// A robot whose mass is outside of these parts of the described one may be another, or be logged in other units: its links are
+/// off by a third at most, and it carries no more than that.
+const MASS: (f64, f64) = (0.62, 1.6);
 /// At most so many things are wrong with the motion.
 const ROUNDS: usize = 6;
 /// The logs while faults are taken out of them.
@@ -100,6 +100,11 @@ impl Search {
         let mut others = self.episodes.clone();
         others.remove(odd);
         let mut rest = part(others, false);
+        // What the others have as well makes no log odd: all are searched together.
+        let shared = |fault: &Fault| rest.faults.iter().any(|o| (o.kind, &o.joints) == (fault.kind, &fault.joints));
+        if own.faults.iter().all(shared) {
+            return None;
+        }
         // All logs as both leave them.
         let mut mended = rest.episodes.clone();
         mended.insert(odd, own.episodes[0].clone());
@@ -208,7 +213,8 @@ impl Search {
             let others: Vec<usize> = (0..logs.model.dof()).filter(|j| !useless(j)).collect();
             for j in effort::absolute_joints(logs, &sample, &torque, &others) {
                 let evidence =
-                    "the effort never changes its sign, though the model's torque does, and is like it in size".to_owned();
+                    "the effort never changes its sign, though the model's torque does, and is like it in size"
+                        .to_owned();
                 let changes = vec![Change::NoEffort(j)];
                 found.push(Fault::new(logs, FaultKind::EffortAbsolute, &[j], &all, None, evidence, changes));
             }

@@ -4,6 +4,7 @@ use super::change::Change;
 use super::decide::Decision;
 use super::motion::{self, Account, Kind};
 use super::sample::Sample;
+use super::weigh::{Freedom, weigh};
 use crate::check::Logs;
 use gapscope_dynamics::JointKind;
 use glam::DVec3;
@@ -12,6 +13,12 @@ use std::f64::consts::FRAC_PI_2;
 /// By how many nats a unit with a name, or a right angle, may fit worse than what lies beside it: bodies that are off by a
 /// few per cent move a factor by as much.
 const NAMED: f64 = 12.0;
+
+/// Factors that are tried on either side of one that limits alone tell, and from one to the next: up to thirty times.
+const ROUGH: i32 = 23;
+const STEP: f64 = 1.16;
+/// Places at which they are tried.
+const FEW: usize = 100;
 
 impl Decision<'_> {
     /// An account whose factor or zero is brought to where its likelihood is greatest; what has a name stays.
@@ -50,6 +57,21 @@ impl Decision<'_> {
             (weighed.score - extra, other)
         };
         let mut best = at(account.value);
+        if account.inside > 0 {
+            // Limits tell that there is a factor, and hardly its size: the size that asks least of the efforts, at few places.
+            let few = sample.thinned(sample.len().div_ceil(FEW).max(1));
+            let ones = vec![1.0; active.len()];
+            let rough = |i: i32| {
+                let value = account.value * STEP.powi(i);
+                let mut changed = few.clone();
+                let change = |j: &usize| motion::apply(&Change::Position(*j, 1.0 / value, 0.0), &mut changed);
+                account.joints.iter().for_each(change);
+                (weigh(self.model, &changed, &ones, active, Freedom::ORDINARY).score, value)
+            };
+            let likeliest = (-ROUGH..=ROUGH).map(rough).max_by(|a, b| a.0.total_cmp(&b.0));
+            let other = likeliest.map(|(_, value)| at(value)).filter(|other| other.0 > best.0);
+            best = other.unwrap_or(best);
+        }
         let mut step = 0.04;
         for _ in 0..9 {
             let moved = |step: f64| if add { best.1.value + step } else { best.1.value * (1.0 + step) };
@@ -73,6 +95,7 @@ impl Decision<'_> {
         let reach = match account.kind {
             Kind::Zero => 0.12,
             Kind::Clock => 0.15,
+            _ if account.inside > 0 => STEP.powi(2).ln(),
             _ => 0.05,
         };
         let off = |value: f64| if add { (value - best.1.value).abs() } else { (value / best.1.value).ln().abs() };

@@ -54,7 +54,7 @@ pub(crate) struct Weighed {
     pub gain_error: Vec<f64>,
     /// Standard deviation of every column of the fit over that before it: of the links' parameters, then of what [`OWN`] says.
     pub narrowed: Vec<f64>,
-    /// Mass of the robot over that of its description.
+    /// Mass that the effort asks the robot to have, over that of its description; gains of the drives are in it.
     pub mass: f64,
     /// What it makes of the effort, joint-major, N m or N.
     pub predicted: Vec<Vec<f64>>,
@@ -171,9 +171,11 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
     });
     let described: f64 = model.joints().iter().map(|joint| joint.inertia.mass.abs()).sum();
     let further: f64 = (0..n).map(|j| solution[10 * j]).sum();
+    let gains: Vec<f64> = (0..n).filter(|&j| active[j]).map(|j| 1.0 + solution[gain_at(j)]).collect();
+    let mean_gain = gains.iter().sum::<f64>() / gains.len().max(1) as f64;
     Weighed {
         score: likelihood - asked,
-        mass: 1.0 + further / described.max(1e-9),
+        mass: (1.0 + further / described.max(1e-9)) * mean_gain,
         asked,
         unexplained,
         gain: (0..n).map(|j| 1.0 + solution[gain_at(j)]).collect(),

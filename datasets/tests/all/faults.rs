@@ -236,6 +236,49 @@ fn gravity_of_another_direction() {
     }
 }
 
+/// A carriage on a rail, as heavy as the first real one that was diagnosed.
+fn slider() -> Model {
+    let urdf = r#"<robot name="slider"><link name="base"/>
+        <link name="carriage"><inertial><mass value="95"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+        <joint name="rail" type="prismatic"><parent link="base"/><child link="carriage"/><axis xyz="1 0 0"/>
+        <limit lower="-0.3" upper="0.3" effort="400" velocity="1"/></joint></robot>"#;
+    Model::from_urdf(urdf).unwrap().model
+}
+
+#[test]
+fn limits_tell_a_position_in_another_unit_and_masses_ask_for_one() {
+    let model = slider();
+    let without_velocity = |factor: f64, effort: f64| {
+        found(&model, 1, |log| {
+            log.velocity = None;
+            times(&mut log.position[0], factor);
+            times(&mut log.effort[0], effort);
+        })
+    };
+    assert_eq!(without_velocity(1.0, 1.0), Faults::default());
+    only(&without_velocity(1e3, 1.0), FaultKind::PositionScale, names(&model, &[0]), Some(1e3));
+    // Counts have no name, and a carriage is known by some per cent: the size is near.
+    let counts = 65536.0;
+    let fault = only(&without_velocity(counts, 1.0), FaultKind::PositionScale, names(&model, &[0]), None);
+    assert!((fault.factor.unwrap() / counts - 1.0).abs() < 0.15, "{fault:#?}");
+    // A part of the effort may be a carriage that is lighter: it is asked, or beyond doubt, and never silent.
+    for effort in [0.25, 1.0 / 35.0] {
+        let faults = without_velocity(1.0, effort);
+        assert!(!faults.faults.is_empty() || !faults.doubts.is_empty(), "{effort}: nothing is said");
+    }
+}
+
+#[test]
+fn what_one_log_has_by_itself_is_no_fault_where_it_does_not_make_it_one_of_the_others() {
+    let model = built_in("arm7");
+    let mut logs = logs(&model, 6, 3);
+    // Somebody pushes in one log: it is not like the others, and no fault of the data.
+    for (k, x) in logs[1].effort[1].iter_mut().enumerate() {
+        *x += if (800..1500).contains(&k) { 25.0 } else { 0.0 };
+    }
+    assert_eq!(find_faults(&model, &logs).faults, []);
+}
+
 #[test]
 fn one_log_of_several_is_named() {
     let model = built_in("arm6");

@@ -125,11 +125,8 @@ impl Scene<'_> {
                 Change::Order(order, channels) if channels.contains(&Channel::Position) => {
                     range = order.iter().map(|&j| range[j]).collect();
                 }
-                Change::Clock(factor) => {
-                    if self.velocity.is_some() {
-                        against +=
-                            if self.velocity_says(factor.recip()) { -AGAINST_VELOCITY } else { AGAINST_VELOCITY };
-                    }
+                Change::Clock(factor) if self.velocity.is_some() => {
+                    against += if self.velocity_says(factor.recip()) { -AGAINST_VELOCITY } else { AGAINST_VELOCITY };
                 }
                 _ => {}
             }

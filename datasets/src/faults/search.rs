@@ -285,7 +285,7 @@ impl Search {
         }
         let Some((weighed, left)) = self.badly_described() else { return };
         let mass = weighed.mass;
-        let strong = self.with_logs(|logs| strong(logs));
+        let strong = self.with_logs(strong);
         let question = if left > STRANGE {
             format!(
                 "are these the logs of this robot? Whatever its bodies and friction, {} of the effort, squared, is left",

@@ -8,7 +8,9 @@ mod signal;
 mod units;
 mod velocity;
 
+pub(crate) use effort::{Fit, fit};
 pub(crate) use signal::Traits;
+pub(crate) use velocity::Relation;
 
 use crate::episode::Episode;
 use gapscope_dynamics::{Finding, Model};
@@ -43,19 +45,36 @@ pub fn check_logs(model: &Model, episodes: &[Episode]) -> Vec<Finding> {
 }
 
 /// The logs with what several rules ask of them.
-struct Logs<'a> {
-    model: &'a Model,
-    episodes: &'a [&'a Episode],
+pub(crate) struct Logs<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) episodes: &'a [&'a Episode],
     /// Median step of time of each episode, s.
-    dt: Vec<f64>,
+    pub(crate) dt: Vec<f64>,
     /// `[episode][joint]`.
-    traits: Vec<Vec<signal::Traits>>,
+    pub(crate) traits: Vec<Vec<signal::Traits>>,
     /// `[episode][joint]`, where there is a velocity and the joint moves.
+    pub(crate) relations: Vec<Vec<Option<velocity::Relation>>>,
+}
+
+/// What was seen of logs, to be put beside them again.
+pub(crate) struct Seen {
+    dt: Vec<f64>,
+    traits: Vec<Vec<signal::Traits>>,
     relations: Vec<Vec<Option<velocity::Relation>>>,
 }
 
 impl<'a> Logs<'a> {
-    fn new(model: &'a Model, episodes: &'a [&'a Episode]) -> Self {
+    /// The same logs as those of which this was seen.
+    pub(crate) fn again(model: &'a Model, episodes: &'a [&'a Episode], seen: Seen) -> Self {
+        Self { model, episodes, dt: seen.dt, traits: seen.traits, relations: seen.relations }
+    }
+
+    /// What was seen.
+    pub(crate) fn seen(self) -> Seen {
+        Seen { dt: self.dt, traits: self.traits, relations: self.relations }
+    }
+
+    pub(crate) fn new(model: &'a Model, episodes: &'a [&'a Episode]) -> Self {
         let dt: Vec<f64> = episodes.iter().map(|episode| episode.dt()).collect();
         let of = |(episode, dt): (&&Episode, &f64)| {
             episode.position.iter().map(|position| signal::Traits::of(&episode.time, position, *dt)).collect()
@@ -67,11 +86,11 @@ impl<'a> Logs<'a> {
     }
 
     /// Unit of a joint's position.
-    fn unit(&self, joint: usize) -> &'static str {
+    pub(crate) fn unit(&self, joint: usize) -> &'static str {
         if self.is_prismatic(joint) { "m" } else { "rad" }
     }
 
-    fn is_prismatic(&self, joint: usize) -> bool {
+    pub(crate) fn is_prismatic(&self, joint: usize) -> bool {
         self.model.joints()[joint].kind == gapscope_dynamics::JointKind::Prismatic
     }
 }
@@ -128,7 +147,7 @@ impl Report<'_> {
 }
 
 /// A number with about three significant digits.
-fn figure(value: f64) -> String {
+pub(crate) fn figure(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }

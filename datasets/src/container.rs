@@ -117,8 +117,18 @@ pub(crate) fn unpack(bytes: Vec<u8>) -> Result<Contents, LogError> {
         return Err(LogError::new(LogErrorKind::UnknownContainer, format!("this is {what}, not CSV"))
             .hint("Unpack it first, or export it as CSV or gzipped CSV"));
     }
+    if contents.bytes.starts_with(b"<?xml") || contents.bytes.starts_with(b"<robot") {
+        return Err(LogError::new(LogErrorKind::UnknownContainer, "this is XML, perhaps the robot; not a log")
+            .hint("The robot comes first, the logs behind it"));
+    }
     if contents.bytes.starts_with(&[0xff, 0xfe]) || contents.bytes.starts_with(&[0xfe, 0xff]) {
         return Err(LogError::new(LogErrorKind::Encoding, "the text is UTF-16").row(1).hint("Save it as UTF-8"));
+    }
+    let first = contents.bytes.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    if first.contains(&0) {
+        return Err(LogError::new(LogErrorKind::UnknownContainer, "this is no text: its first line holds zero bytes")
+            .row(1)
+            .hint("Name the log in the form that its logger wrote"));
     }
     Ok(contents)
 }
@@ -158,6 +168,8 @@ mod tests {
 
     #[test]
     fn other_containers_are_named() {
+        assert!(unpack(b"<robot name=\"a\">".to_vec()).unwrap_err().hint.contains("robot comes first"));
+        assert!(unpack(b"\0\x01binary".to_vec()).unwrap_err().found.contains("no text"));
         assert!(unpack(b"PAR1....".to_vec()).unwrap_err().found.contains("Parquet"));
         assert_eq!(unpack(vec![]).unwrap_err().kind, LogErrorKind::Empty);
         assert_eq!(unpack(vec![0xff, 0xfe, b't', 0]).unwrap_err().kind, LogErrorKind::Encoding);

@@ -39,6 +39,11 @@ pub(crate) fn parse(contents: &Contents, joints: &[String], options: &ReadOption
         let _ = reader.read_byte_record(&mut record);
     }
     let mut columns = Rows::new(text, &plan, delimiter, options).read(&mut reader, &mut notes)?;
+    if columns.lines.is_empty() {
+        return Err(LogError::new(LogErrorKind::Empty, "the file has a header and not one whole row")
+            .row(1)
+            .hint("Check whether the logger ran; a log has one row per sample"));
+    }
     Ok(Table {
         label: String::new(),
         rows: std::mem::take(&mut columns.lines),

@@ -83,6 +83,8 @@ pub struct Episode {
     pub temperature: Option<Samples>,
     /// Known external effort, added to `effort`, N m or N.
     pub disturbance: Option<Samples>,
+    /// Joints whose effort tells nothing, by index: it was not recorded, or what stands there is no torque.
+    pub effort_unknown: Vec<usize>,
 }
 
 impl Episode {
@@ -154,6 +156,7 @@ impl Episode {
             name: name.into(),
             joints: self.joints.clone(),
             time: self.time[from..to].to_vec(),
+            effort_unknown: self.effort_unknown.clone(),
             ..Episode::default()
         };
         for channel in Channel::ALL {

@@ -100,6 +100,9 @@ pub enum GenerateError {
     },
 }
 
+/// No log of a robot is faster, Hz: where more is asked, the rate is the slip and not the length.
+const FASTEST: f64 = 1e6;
+
 impl Recipe {
     /// Length of a physics step, s: what a plant for [`record`] is made with.
     pub fn step(&self) -> f64 {
@@ -113,6 +116,9 @@ impl Recipe {
         }
         if self.substeps == 0 {
             return Err(fail(("substeps", 0.0, "one at least")));
+        }
+        if self.rate > FASTEST {
+            return Err(fail(("rate", self.rate, "no more than a million samples a second")));
         }
         if !(self.seconds > 0.0 && self.seconds * self.rate <= SAMPLES_AT_MOST) {
             return Err(fail(("seconds", self.seconds, "positive, and no more than ten million samples")));

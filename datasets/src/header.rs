@@ -4,6 +4,7 @@ use crate::channel_names;
 use crate::column_map::ColumnMap;
 use crate::episode::{Channel, Episode};
 use crate::error::{LogError, LogErrorKind};
+use crate::joint_names;
 use std::collections::BTreeSet;
 
 /// One column that is read.
@@ -24,6 +25,8 @@ pub(crate) struct Feed {
 pub(crate) struct Plan {
     /// Number of cells in a row.
     pub width: usize,
+    /// Whether the last column has no name: a separator behind each cell, which rows may lack.
+    pub trailing: bool,
     /// Time first, then the joints of each of `channels` in turn.
     pub feeds: Vec<Feed>,
     /// Channels that the file carries for every joint.
@@ -63,6 +66,7 @@ pub(crate) fn plan(columns: &[String], joints: &[String], map: &ColumnMap) -> Re
     used.insert(time.index);
     let mut plan = Plan {
         width: columns.len(),
+        trailing: columns.len() > 1 && columns.last().is_some_and(String::is_empty),
         feeds: vec![time],
         channels: Vec::new(),
         undisturbed: Vec::new(),
@@ -101,7 +105,11 @@ impl Header<'_> {
         if numbers > 0 && 2 * numbers > named.count() {
             return Err(LogError::new(LogErrorKind::NoHeader, "the first line holds numbers, not names of columns")
                 .row(1)
-                .hint(format!("Put a header above it: time,{}", self.native_names(Channel::Position))));
+                .hint(format!(
+                    "Put a header above it: time,{},{}",
+                    self.native_names(Channel::Position),
+                    self.native_names(Channel::Effort)
+                )));
         }
         Ok(())
     }
@@ -277,6 +285,32 @@ impl Header<'_> {
                 .column(&target);
         let error = LogError { absent: self.absent(channel, &names).into(), ..error };
         let near: Vec<String> = self.near(joint).into_iter().filter(|column| !native(&column)).collect();
+        // A joint's name may be misspelt; of other robots' joints the names are told.
+        let meant = |column: &&String| {
+            column
+                .split_once('.')
+                .is_some_and(|(channel, other)| channel == name && joint_names::misspelt(other, joint))
+        };
+        let strange = |column: &String| {
+            let (_, other) = column.split_once('.').filter(|(channel, _)| *channel == name)?;
+            (!self.joints.iter().any(|known| known.trim() == other)).then(|| other.to_owned())
+        };
+        let strangers: Vec<String> = self.columns.iter().filter_map(strange).collect();
+        if let Some(column) = self.columns.iter().find(meant) {
+            return error.hint(format!("If `{column}` is meant: --map \"{target}={column}\""));
+        }
+        if !strangers.is_empty() {
+            let mut hint = format!("The log has {name} of {}", list(&strangers, 8));
+            hint += &if strangers.len() == missing.len() && missing.len() == self.joints.len() {
+                format!(
+                    ": another robot's log, or other names; if the order is the same, --map \"{target}={name}.{}\" and so on",
+                    strangers[0]
+                )
+            } else {
+                ": check that the log belongs to this robot".to_owned()
+            };
+            return error.hint(hint);
+        }
         let foreign: Vec<String> = self
             .columns
             .iter()

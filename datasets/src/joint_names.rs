@@ -138,6 +138,25 @@ fn shared_start(names: &[String]) -> usize {
     first.as_bytes()[..shared].iter().rposition(|byte| *byte == b'_').map_or(0, |at| at + 1)
 }
 
+/// Whether a name is another but for one letter that is wrong, missing or too many, two that are exchanged, or case and signs.
+pub(crate) fn misspelt(name: &str, wanted: &str) -> bool {
+    let plain =
+        |text: &str| text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect::<Vec<char>>();
+    let (a, b) = (plain(name), plain(wanted));
+    if a == b || a.len() < 4 || a.len().abs_diff(b.len()) > 1 {
+        return a == b;
+    }
+    // Numbers tell joints apart: joint1 is not joint2 misspelt.
+    let digits = |text: &[char]| text.iter().filter(|c| c.is_ascii_digit()).copied().collect::<Vec<char>>();
+    let same = a.iter().zip(&b).take_while(|(a, b)| a == b).count();
+    let (rest_a, rest_b) = (&a[same..], &b[same..]);
+    let swapped =
+        rest_a.len() > 1 && rest_b.len() > 1 && rest_a[..2] == [rest_b[1], rest_b[0]] && rest_a[2..] == rest_b[2..];
+    let replaced = a.len() == b.len() && rest_a.get(1..) == rest_b.get(1..);
+    let added = rest_a.get(1..) == Some(rest_b) || rest_b.get(1..) == Some(rest_a);
+    digits(&a) == digits(&b) && (swapped || replaced || added)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

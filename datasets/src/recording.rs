@@ -35,6 +35,10 @@ impl Recording {
         let plan = plan(&names, joints, &request.options.map).map_err(|error| LogError { row: None, ..error })?;
         self.notes.extend(plan.notes.iter().cloned());
         let count = self.columns[plan.feeds[0].index].1.len();
+        if count == 0 {
+            return Err(LogError::new(LogErrorKind::Empty, "the run holds not one sample")
+                .hint("Check whether the logger ran; a log has one row per sample"));
+        }
         let mut numbers = Vec::with_capacity(plan.feeds.len());
         let mut dropped = Vec::new();
         for feed in &plan.feeds {

@@ -122,13 +122,18 @@ impl<'a> Rows<'a> {
         spare: &mut dyn FnMut(&Feed, Channel, &LogError),
     ) -> Result<(), Fault> {
         // A comma at the end of each row makes one empty cell more.
-        let closed = record.len() == self.plan.width + 1 && record.get(self.plan.width).is_some_and(<[u8]>::is_empty);
-        if record.len() != self.plan.width && !closed {
+        let closed = record.len() == self.plan.width + 1
+            && record.get(self.plan.width).is_some_and(|cell| cell.trim_ascii().is_empty());
+        // Or it stands in the header alone, which so has a column without a name.
+        let open = self.plan.trailing && record.len() + 1 == self.plan.width;
+        if record.len() != self.plan.width && !closed && !open {
             let mut found = format!("the row has {} cells, the header {}", record.len(), self.plan.width);
             if record.iter().any(|cell| cell.contains(&b'\n')) {
                 found.push_str("; a quotation mark is not closed");
             }
-            let hint = if self.delimiter == b',' && record.len() > self.plan.width {
+            let hint = if record.iter().any(|cell| cell.starts_with(b"#")) {
+                "Leave out lines of comments below the header"
+            } else if self.delimiter == b',' && record.len() > self.plan.width {
                 "If numbers are written with a decimal comma, write them with a point"
             } else {
                 "Every row has one cell for each column of the header"
@@ -175,7 +180,9 @@ impl<'a> Rows<'a> {
             Some(_) => (LogErrorKind::NotFinite, format!("{} is not a number", shown(cell)), Cow::from(INVALID)),
             None if cell.is_empty() => (LogErrorKind::EmptyCell, "the cell is empty".to_owned(), Cow::from(INVALID)),
             None => {
-                let hint = if cell.contains(&b',') {
+                let hint = if cell == feed.column.as_bytes() {
+                    "The header stands here once more: leave this row out, or split the file where a new run starts"
+                } else if cell.contains(&b',') {
                     "Write decimals with a point"
                 } else {
                     "Cells hold plain decimal numbers"

@@ -29,14 +29,36 @@ pub struct Corrected {
     pub alignment: f64,
     /// The effects.
     pub effects: Vec<Effect>,
+    /// What it was made from; an extension of the schema.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_from: Option<Origin>,
+}
+
+/// Digests of the files that a correction was made from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Of the robot description.
+    pub robot: String,
+    /// Of each log.
+    pub logs: Vec<String>,
+}
+
+/// What a file of JSON says that it is.
+#[derive(Deserialize)]
+struct Schema {
+    #[serde(default)]
+    schema: String,
 }
 
 /// Why a corrected model cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CorrectedError {
     /// Not JSON, or not of this shape.
-    #[error("not a corrected model ({0}); expected the corrected.json that `gapscope diagnose` writes")]
+    #[error("not a corrected model; expected the corrected.json that `gapscope diagnose` writes")]
     Unreadable(#[from] serde_json::Error),
+    /// The diagnosis itself.
+    #[error("this is a diagnosis, not the corrected model; corrected.json lies beside it")]
+    Diagnosis,
     /// Another schema.
     #[error("schema is `{0}`, expected `{MODEL_SCHEMA}`; write the file anew with this version's `gapscope diagnose`")]
     Schema(String),
@@ -79,6 +101,10 @@ impl Corrected {
     /// # Errors
     /// What is wrong with the text, or why it does not fit the robot.
     pub fn from_json(text: &str, model: &Model) -> Result<Corrected, CorrectedError> {
+        let schema: Schema = serde_json::from_str(text)?;
+        if schema.schema == crate::schema::DIAGNOSIS_SCHEMA {
+            return Err(CorrectedError::Diagnosis);
+        }
         let corrected: Corrected = serde_json::from_str(text)?;
         if corrected.schema != MODEL_SCHEMA {
             return Err(CorrectedError::Schema(corrected.schema));

@@ -87,7 +87,11 @@ pub fn diagnose(
     progress("reading signals", 0.0);
     let signals = signals(model, episodes, &mut findings);
     let still = standstill(&signals, model.dof());
-    let moving = moving(&signals, &still, model, &mut findings);
+    let mut moving = moving(&signals, &still, model, &mut findings);
+    // A joint whose effort is not known keeps its place in the dynamics of the others, without rows of its own.
+    for &j in episodes.iter().flat_map(|episode| &episode.effort_unknown) {
+        moving[j] = false;
+    }
     let band = Band::new(&signals);
     let data = DataSummary {
         episodes: episodes.len(),
@@ -95,6 +99,8 @@ pub fn diagnose(
         duration: episodes.iter().map(Episode::duration).sum(),
         rate: episodes.iter().map(Episode::rate).fold(0.0, f64::max),
         band: band.cutoff,
+        faults: Vec::new(),
+        doubts: Vec::new(),
         findings,
     };
     let noisier = noisier(model, episodes, &signals);
@@ -399,6 +405,7 @@ impl Logs<'_> {
             alignment: fit.alignment(),
             // A push belongs to its own log.
             effects: effects.into_iter().filter(|e| e.kind() != Kind::ExternalContact).collect(),
+            made_from: None,
         };
         let gap_of = |held_out: &HeldOut| Gap {
             torque: gap::torque_gap(model, &self.band, &held_out.rows, &floor, everything),
@@ -599,6 +606,7 @@ impl Logs<'_> {
             encoder_side: EncoderSide::Link,
             alignment: 0.0,
             effects: Vec::new(),
+            made_from: None,
         };
         Outcome { diagnosis, evidence: Evidence::default(), corrected, trajectory }
     }

@@ -40,7 +40,11 @@ pub fn evaluate(
     let signals = signals(model, episodes, &mut Vec::new());
     let n = model.dof();
     let still = corrected.map_or_else(|| standstill(&signals, n), |c| per_joint(model, &c.standstill));
-    let weights = corrected.map_or_else(|| gap::weights(&signals, &vec![true; n]), |c| per_joint(model, &c.weights));
+    let mut weights =
+        corrected.map_or_else(|| gap::weights(&signals, &vec![true; n]), |c| per_joint(model, &c.weights));
+    let unknown: std::collections::BTreeSet<usize> =
+        episodes.iter().flat_map(|e| e.effort_unknown.iter().copied()).collect();
+    unknown.iter().for_each(|&j| weights[j] = 0.0);
     let band = Band::whole(&signals);
     let nominal: Vec<Vec<Vec<f64>>> =
         signals.iter().map(|s| residual(&mut Plant::nominal(model, s.dt), model, s, &still, 0.0)).collect();
@@ -79,7 +83,7 @@ pub fn evaluate(
             }
         })
         .collect();
-    let evaluation = Evaluation {
+    let mut evaluation = Evaluation {
         schema: EVALUATION_SCHEMA.to_owned(),
         gap: Gap {
             torque: gap::torque_gap(model, &band, &before_rows, &floor, |_| true),
@@ -90,6 +94,10 @@ pub fn evaluate(
         shrink,
         logs,
     };
+    for &j in &unknown {
+        evaluation.gap.leave_out(&model.joints()[j].name);
+        evaluation.shrink.iter_mut().for_each(Shrink::leave_out_motion);
+    }
     let predictions =
         signals.iter().enumerate().map(|(e, s)| predictions(s, &band, e, &before_rows, &after_rows)).collect();
     Ok((evaluation, predictions))

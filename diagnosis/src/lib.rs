@@ -9,10 +9,12 @@
 mod band;
 mod bootstrap;
 mod break_away;
+mod ceiling;
 mod climb;
 mod contact;
 mod corrected;
 mod diagnose;
+mod doubt;
 mod drive;
 mod estimate;
 mod evaluate;
@@ -39,7 +41,7 @@ mod signals;
 mod support;
 mod verdict;
 
-pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA};
+pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA, Origin};
 pub use diagnose::{Outcome, Progress, diagnose};
 pub use evaluate::{Predictions, evaluate, torque_changes};
 pub use experiment::FILE as NEXT_EXPERIMENT;

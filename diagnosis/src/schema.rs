@@ -2,6 +2,7 @@
 //!
 //! Maps are keyed by joint name and sorted, so that the same diagnosis gives the same bytes.
 
+use gapscope_datasets::{Doubt, Fault};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -92,6 +93,12 @@ pub struct DataSummary {
     pub rate: f64,
     /// Band in which torque is compared: cut-off of the zero-phase low-pass filter, Hz.
     pub band: f64,
+    /// What is wrong with the logs beyond doubt, gravest first; the diagnosis is that of the mended logs where it says so.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<Fault>,
+    /// What may be wrong with them, or an effect; an extension of the schema.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<Doubt>,
     /// What was odd in the robot description and the logs, in words.
     pub findings: Vec<String>,
 }

@@ -79,6 +79,7 @@ fn sample(model: &Model, seed: u64) -> Corrected {
         encoder_side: EncoderSide::Link,
         alignment: -1e-3 / 7.0,
         effects,
+        made_from: None,
     }
 }
 

@@ -41,6 +41,7 @@ fn every_kind_has_its_line_and_no_figure_without_logs() {
     assert_eq!(kinds.len(), Kind::ALL.len());
     let all = |x: f64| loaded.model.joints().iter().map(|joint| (joint.name.clone(), x)).collect();
     let corrected = Corrected {
+        made_from: None,
         schema: MODEL_SCHEMA.to_owned(),
         robot: "arm6".to_owned(),
         weights: all(1.0),

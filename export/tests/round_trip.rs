@@ -46,6 +46,7 @@ fn effects(json: &str, model: &Model) -> Vec<Effect> {
 fn corrected(model: &Model, effects: Vec<Effect>) -> Corrected {
     let all = |x: f64| model.joints().iter().map(|joint| (joint.name.clone(), x)).collect();
     Corrected {
+        made_from: None,
         schema: MODEL_SCHEMA.to_owned(),
         robot: model.name().to_owned(),
         weights: all(1.0),

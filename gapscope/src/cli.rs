@@ -23,6 +23,8 @@ pub enum Command {
     Evaluate(Evaluate),
     /// Write the corrected model for a simulator, with a ledger of what it holds there
     Export(Export),
+    /// Look at logs: rate, gaps, jitter, steps and motion of each joint; with the robot also faults and what they determine
+    Inspect(Inspect),
     /// Show how the model's error grows over the horizon, beside what one-step errors and Jacobians allow
     Rollout(Rollout),
     /// Run a study of this project's own, as its documents show it
@@ -83,6 +85,9 @@ pub struct Input {
     /// Leave out logs that cannot be read instead of stopping
     #[arg(long)]
     pub skip_bad_logs: bool,
+    /// Take the logs as they are, where a wrong unit, sign, order, zero or clock was found
+    #[arg(long)]
+    pub as_logged: bool,
 }
 
 /// Arguments of `diagnose`.
@@ -100,6 +105,35 @@ pub struct Diagnose {
     /// Print what was proposed, against what, and by how much the logs spoke for or against it
     #[arg(long)]
     pub why: bool,
+}
+
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// Logs, as `diagnose` reads them; without --model only CSV
+    #[arg(required = true)]
+    pub logs: Vec<PathBuf>,
+    /// Robot description to hold the logs against: URDF, xacro or MJCF
+    #[arg(long, value_name = "ROBOT")]
+    pub model: Option<PathBuf>,
+    /// Read a column of another name, e.g. `position.joint1=/joint_states/j1/pos`; may be given several times
+    #[arg(long = "map", value_name = "NATIVE=COLUMN")]
+    pub map: Vec<String>,
+    /// Read column names from a TOML file
+    #[arg(long, value_name = "FILE")]
+    pub map_file: Option<PathBuf>,
+    /// Read this topic of a bag; may be given several times
+    #[arg(long = "topic", value_name = "TOPIC")]
+    pub topic: Vec<String>,
+    /// Read these episodes of a dataset, e.g. `3` or `0-9,20`
+    #[arg(long, value_name = "RANGES")]
+    pub episodes: Option<String>,
+    /// Hold a joint of the robot fixed at zero; may be given several times
+    #[arg(long = "lock", value_name = "JOINT")]
+    pub lock: Vec<String>,
+    /// Print one JSON object and nothing else
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `evaluate`.
@@ -193,13 +227,13 @@ pub struct Rollout {
     #[arg(long, value_name = "DIR|FILE")]
     pub pure: Option<PathBuf>,
     /// Longest horizon, s
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, allow_negative_numbers = true, default_value_t = 1.0)]
     pub horizon: f64,
     /// Position error over all joints at which a rollout has left the log, rad or m
-    #[arg(long, default_value_t = 0.05)]
+    #[arg(long, allow_negative_numbers = true, default_value_t = 0.05)]
     pub tolerance: f64,
     /// Fit each rollout's initial state to this many seconds of the log: for noisy logs
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     pub fit_start: Option<f64>,
     /// Rollouts over all logs
     #[arg(long, default_value_t = 240)]
@@ -278,13 +312,13 @@ pub struct Generate {
     #[arg(long, value_name = "FILE")]
     pub effects: Option<PathBuf>,
     /// Perturb every link's mass, centre of mass and inertia and every joint's friction at random; 1 is an ordinary size
-    #[arg(long, value_name = "SCALE", num_args = 0..=1, default_missing_value = "1")]
+    #[arg(long, allow_negative_numbers = true, value_name = "SCALE", num_args = 0..=1, default_missing_value = "1")]
     pub perturb: Option<f64>,
     /// Reference motion, drawn anew for each episode
     #[arg(long, value_enum, default_value_t = Motion::Fourier)]
     pub motion: Motion,
     /// Pace of the motion; limits of the URDF may slow it down
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, allow_negative_numbers = true, default_value_t = 1.0)]
     pub speed: f64,
     /// Follow this motion from first to last row, such as the next_experiment.csv that `diagnose` proposes
     #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "speed", "seconds"])]
@@ -296,34 +330,34 @@ pub struct Generate {
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     pub episodes: u64,
     /// Length of each log, s
-    #[arg(long, default_value_t = 10.0)]
+    #[arg(long, allow_negative_numbers = true, default_value_t = 10.0)]
     pub seconds: f64,
     /// Sampling and control rate, Hz
-    #[arg(long, value_name = "HZ", default_value_t = 500.0)]
+    #[arg(long, allow_negative_numbers = true, value_name = "HZ", default_value_t = 500.0)]
     pub rate: f64,
     /// What is drawn at random follows from this number: the same seed gives the same bytes
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
     /// Standard deviation of the encoders' noise, rad or m
-    #[arg(long, value_name = "SIZE", default_value_t = 2e-6)]
+    #[arg(long, allow_negative_numbers = true, value_name = "SIZE", default_value_t = 2e-6)]
     pub position_noise: f64,
     /// Step of the encoders, rad or m; 0 for none
-    #[arg(long, value_name = "STEP", default_value_t = 0.0)]
+    #[arg(long, allow_negative_numbers = true, value_name = "STEP", default_value_t = 0.0)]
     pub encoder_step: f64,
     /// Log velocity too: differences of the encoder through a first-order low-pass filter of this cut-off
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, allow_negative_numbers = true, value_name = "HZ")]
     pub velocity_cutoff: Option<f64>,
     /// Standard deviation of the noise of the logged effort, as a part of each joint's rms effort
-    #[arg(long, value_name = "PART", default_value_t = 1e-3)]
+    #[arg(long, allow_negative_numbers = true, value_name = "PART", default_value_t = 1e-3)]
     pub effort_noise: f64,
     /// Amplitude of a ripple of the logged effort over position, as a part of each joint's rms effort
-    #[arg(long, value_name = "PART", default_value_t = 0.0)]
+    #[arg(long, allow_negative_numbers = true, value_name = "PART", default_value_t = 0.0)]
     pub effort_ripple: f64,
     /// Standard deviation of the time stamps' error, s
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 0.0)]
     pub clock_jitter: f64,
     /// Probability at which a sample is missing
-    #[arg(long, value_name = "PROBABILITY", default_value_t = 0.0)]
+    #[arg(long, allow_negative_numbers = true, value_name = "PROBABILITY", default_value_t = 0.0)]
     pub dropped: f64,
     /// Log elastic joints, and joints with play, on the motor's side
     #[arg(long)]
@@ -431,19 +465,19 @@ pub struct Train {
     #[arg(long)]
     pub batch: Option<usize>,
     /// Adam's learning rate [default: the reference's 0.001]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Let the learning rate fall to zero along half a cosine
     #[arg(long)]
     pub cosine: bool,
     /// Weight of the residual's mean square [default: the reference's 0.001]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub penalty: Option<f64>,
     /// Stop after so many epochs without a better held-out loss
     #[arg(long)]
     pub patience: Option<usize>,
     /// Time of a step, s
-    #[arg(long, default_value_t = gapscope_network::Learner::DT)]
+    #[arg(long, allow_negative_numbers = true, default_value_t = gapscope_network::Learner::DT)]
     pub dt: f64,
     /// Draws initial weights and the order of the data
     #[arg(long, default_value_t = 0)]
@@ -500,6 +534,9 @@ pub struct MakeBank {
     /// none; 2 for arms that are off by more. `--cases` counts them [default: each further kind once]
     #[arg(long, value_name = "1|2", num_args = 0..=1, default_missing_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
     pub used: Option<u8>,
+    /// Spoil the logs of two cases in three by one fault drawn at random: a unit, a sign, a clock, an effort not recorded, …
+    #[arg(long)]
+    pub faulty: bool,
     /// Robots, taken in turn: arm7, arm6, double_pendulum, or URDF files
     #[arg(long, value_name = "ROBOT,…", value_delimiter = ',', default_value = "arm7")]
     pub robots: Vec<String>,
@@ -510,7 +547,7 @@ pub struct MakeBank {
     #[arg(long, value_enum, default_value_t = Level::Mixed)]
     pub difficulty: Level,
     /// Length of an episode
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 10.0)]
     pub seconds: f64,
     /// Logs per case
     #[arg(long, value_name = "N", default_value_t = 4)]
@@ -544,7 +581,7 @@ pub struct ScoreBank {
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     pub jobs: Option<usize>,
     /// Longest time that a diagnosis may take, s
-    #[arg(long, value_name = "SECONDS", default_value_t = 600.0)]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 600.0)]
     pub timeout: f64,
     /// Print one JSON object and nothing else
     #[arg(long)]

@@ -19,8 +19,7 @@ pub fn run(args: &Diagnose) -> Result<String> {
     let progress = Progress::new();
     progress.stage("reading robot and logs", 0.0);
     let loaded = load(&args.input)?;
-    let mut outcome = diagnose(&loaded.model, &loaded.episodes, loaded.findings, &|s, p| progress.stage(s, p))?;
-    progress.finish();
+    let mut outcome = diagnosed(loaded, &progress)?;
     outcome.evidence.robot_file = args.input.robot.display().to_string();
     outcome.evidence.logs = args.input.logs.iter().map(|l| l.display().to_string()).collect();
     write(&outcome, &out)?;
@@ -37,9 +36,16 @@ pub fn run(args: &Diagnose) -> Result<String> {
 /// # Errors
 /// None that a log can cause.
 pub fn with_progress(loaded: Loaded) -> Result<Outcome> {
-    let progress = Progress::new();
-    let outcome = diagnose(&loaded.model, &loaded.episodes, loaded.findings, &|s, p| progress.stage(s, p))?;
+    diagnosed(loaded, &Progress::new())
+}
+
+fn diagnosed(loaded: Loaded, progress: &Progress) -> Result<Outcome> {
+    let Loaded { model, episodes, findings, faults, doubts, origin } = loaded;
+    let mut outcome = diagnose(&model, &episodes, findings, &|s, p| progress.stage(s, p))?;
     progress.finish();
+    outcome.within_physics(&model);
+    outcome.under(faults, doubts);
+    outcome.corrected.made_from = Some(origin);
     Ok(outcome)
 }
 
@@ -48,17 +54,18 @@ pub fn with_progress(loaded: Loaded) -> Result<Outcome> {
 /// # Errors
 /// A file that cannot be written.
 pub fn write(outcome: &Outcome, out: &Path) -> Result<()> {
-    output::write(&out.join("diagnosis.json"), &serde_json::to_string_pretty(&outcome.diagnosis)?)?;
-    output::write(&out.join("corrected.json"), &outcome.corrected.to_json()?)?;
     let proposed = outcome.diagnosis.next_experiment.as_ref().and_then(|next| next.trajectory.as_ref());
-    match proposed.zip(outcome.trajectory.as_ref()) {
-        Some((file, trajectory)) => output::write(&out.join(file), &trajectory.to_csv())?,
-        // The advice of an earlier diagnosis in this folder is out of date.
-        None => output::remove(&out.join(NEXT_EXPERIMENT))?,
-    }
+    let motion = proposed.zip(outcome.trajectory.as_ref()).map(|(_, trajectory)| trajectory.to_csv());
     let mut evidence = outcome.evidence.clone();
     evidence.corrected_file = out.join("corrected.json").display().to_string();
-    output::write(&out.join("report.html"), &report::html(&outcome.diagnosis, &evidence))
+    let files = [
+        ("diagnosis.json", Some(serde_json::to_string_pretty(&outcome.diagnosis)?)),
+        ("corrected.json", Some(outcome.corrected.to_json()?)),
+        ("report.html", Some(report::html(&outcome.diagnosis, &evidence))),
+        // The advice of an earlier diagnosis in this folder is out of date.
+        (NEXT_EXPERIMENT, motion),
+    ];
+    output::write_all(out, &files)
 }
 
 /// A bar on standard error where that is a terminal, nothing elsewhere.

@@ -1,7 +1,7 @@
 //! `gapscope evaluate`.
 
 use crate::cli::Evaluate;
-use crate::input::load;
+use crate::input::{load, strangeness};
 use crate::{output, summary};
 use anyhow::{Context, Result, bail};
 use gapscope_diagnosis::{Corrected, Predictions, evaluate};
@@ -16,7 +16,7 @@ pub fn run(args: &Evaluate) -> Result<String> {
     if let Some(file) = args.predictions.as_ref().filter(|f| f.exists() && !args.force) {
         bail!("{} exists already; choose another name, or allow it to be replaced with --force", file.display());
     }
-    let loaded = load(&args.input)?;
+    let mut loaded = load(&args.input)?;
     let corrected = match &args.with {
         Some(file) => {
             let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
@@ -25,6 +25,9 @@ pub fn run(args: &Evaluate) -> Result<String> {
         }
         None => None,
     };
+    let made_from = corrected.as_ref().and_then(|corrected| corrected.made_from.as_ref());
+    loaded.findings.splice(0..0, strangeness(made_from, &args.input, &loaded.origin));
+    loaded.warn();
     let (evaluation, predictions) = evaluate(&loaded.model, &loaded.episodes, corrected.as_ref())?;
     if let Some(file) = &args.predictions {
         output::write(file, &table(&loaded.model, &predictions))?;

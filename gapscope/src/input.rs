@@ -2,9 +2,14 @@
 
 use crate::cli::Input;
 use crate::robot;
-use anyhow::{Context, Result};
-use gapscope_datasets::{Calibration, ColumnMap, Episode, ReadOptions, check_logs, read_logs};
+use anyhow::{Context, Result, bail};
+use gapscope_datasets::{
+    Calibration, ColumnMap, Doubt, Episode, Fault, LONGEST_STEP, ReadOptions, check_logs, digest, find_faults, mend,
+    read_logs,
+};
+use gapscope_diagnosis::Origin;
 use gapscope_dynamics::{Finding, Model};
+use std::io::Write;
 
 /// What the command line named, read and checked.
 pub struct Loaded {
@@ -12,8 +17,45 @@ pub struct Loaded {
     pub model: Model,
     /// The logs.
     pub episodes: Vec<Episode>,
-    /// What was odd in either, in words.
+    /// What was odd in either, in words, gravest first.
     pub findings: Vec<String>,
+    /// What is wrong with the logs beyond doubt; undone in `model` and `episodes` where it says so.
+    pub faults: Vec<Fault>,
+    /// What may be wrong with them.
+    pub doubts: Vec<Doubt>,
+    /// Digests of the files.
+    pub origin: Origin,
+}
+
+impl Loaded {
+    /// What is wrong with the logs, and what may be, in lines.
+    pub fn warnings(&self) -> Vec<String> {
+        let faults = self.faults.iter().map(fault_line);
+        faults.chain(self.doubts.iter().map(|doubt| format!("In doubt: {}", doubt.question))).collect()
+    }
+
+    /// Says on standard error what is wrong with the logs, for commands that have no place for it in their answer.
+    pub fn warn(&self) {
+        let mut out = std::io::stderr();
+        for line in self.warnings().iter().chain(&self.findings) {
+            let clean: String = line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+            let _ = writeln!(out, "note: {clean}");
+        }
+    }
+}
+
+/// A fault in one line.
+pub fn fault_line(fault: &Fault) -> String {
+    let files = if fault.files.is_empty() { String::new() } else { format!("{}: ", fault.files.join(", ")) };
+    let named = fault.joints.iter().any(|joint| fault.evidence.contains(joint.as_str()));
+    let joints =
+        if fault.joints.is_empty() || named { String::new() } else { format!("{}: ", fault.joints.join(", ")) };
+    let done = match (fault.mended, fault.leaves_joints_out()) {
+        (true, _) => "mended here; to mend the log",
+        (false, true) => "left out here; the mend",
+        (false, false) => "taken as logged; the mend",
+    };
+    format!("{files}{joints}{}. {done}: {}", fault.evidence, fault.mend)
 }
 
 /// Reads robot and logs. Joints of which the logs say nothing are held at zero, with a finding.
@@ -38,14 +80,46 @@ pub fn load(input: &Input) -> Result<Loaded> {
             }
             read => read?,
         };
-        let checks = check_logs(&robot.model, &episodes);
-        let findings =
-            robot.findings.iter().chain(&said).chain(&notes).chain(&checks).map(ToString::to_string).collect();
-        return Ok(Loaded { model: robot.model, episodes, findings });
+        said.extend(notes);
+        said.extend(robot.findings);
+        return checked(input, robot.model, episodes, said);
     }
 }
 
-fn options(input: &Input) -> Result<ReadOptions> {
+/// Holds the logs against themselves and the model, and undoes what is wrong with them beyond doubt.
+fn checked(input: &Input, model: Model, episodes: Vec<Episode>, said: Vec<Finding>) -> Result<Loaded> {
+    let mut found = find_faults(&model, &episodes);
+    let (model, episodes) = if input.as_logged {
+        found.faults.iter_mut().for_each(|fault| fault.mended = false);
+        (model, episodes)
+    } else {
+        mend(&model, &episodes, &found.faults)
+    };
+    let (slow, episodes): (Vec<Episode>, Vec<Episode>) =
+        episodes.into_iter().partition(|episode| episode.dt() > LONGEST_STEP);
+    let left_out = slow.iter().map(|episode| {
+        let message = format!(
+            "the median step of time is {} s, too long to show how a robot moves: left out. If the stamps are in another unit, \
+             scale them: a --map-file with `[columns]` and below it `time = {{ column = \"time\", scale = 0.001 }}` for ms",
+            episode.dt()
+        );
+        Finding::new(episode.name.clone(), message)
+    });
+    let said: Vec<Finding> = left_out.chain(said).collect();
+    if let Some(first) = said.first().filter(|_| episodes.is_empty() && !slow.is_empty()) {
+        bail!("{first}");
+    }
+    // What is held against the model weighs most, what the reader of the robot passed over least.
+    let checks = check_logs(&model, &episodes);
+    let findings = checks.iter().chain(&said).map(ToString::to_string).collect();
+    Ok(Loaded { model, episodes, findings, faults: found.faults, doubts: found.doubts, origin: origin(input)? })
+}
+
+/// How the logs are to be read.
+///
+/// # Errors
+/// A column map, a range or a calibration that cannot be read.
+pub fn options(input: &Input) -> Result<ReadOptions> {
     let mut map = match &input.map_file {
         Some(file) => ColumnMap::from_toml_file(file)?,
         None => ColumnMap::default(),
@@ -61,6 +135,30 @@ fn options(input: &Input) -> Result<ReadOptions> {
         // A hole in a channel that nothing here needs is worth a finding, not the log.
         drop_bad_channels: true,
     })
+}
+
+/// Digests of the robot description and the logs.
+fn origin(input: &Input) -> Result<Origin> {
+    let of = |path: &std::path::PathBuf| digest(path).with_context(|| format!("cannot read {}", path.display()));
+    Ok(Origin { robot: of(&input.robot)?, logs: input.logs.iter().map(of).collect::<Result<_>>()? })
+}
+
+/// What is to be said where a correction is put on logs: another robot than its own, or the logs that it was fitted on.
+pub fn strangeness(made_from: Option<&Origin>, input: &Input, origin: &Origin) -> Vec<String> {
+    let Some(from) = made_from else { return Vec::new() };
+    let mut notes = Vec::new();
+    if from.robot != origin.robot {
+        notes.push(format!("{}: not the robot description that the correction was made with", input.robot.display()));
+    }
+    for (log, digest) in input.logs.iter().zip(&origin.logs) {
+        if !digest.is_empty() && from.logs.contains(digest) {
+            notes.push(format!(
+                "{}: the correction was fitted on this very log; only other logs say how far it holds",
+                log.display()
+            ));
+        }
+    }
+    notes
 }
 
 /// Ranges of numbers, as `0-9,20`.

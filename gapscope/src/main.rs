@@ -8,6 +8,7 @@ mod evaluate;
 mod export;
 mod generate;
 mod input;
+mod inspect;
 mod learned;
 mod output;
 mod picture;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Study(study) => study::run(&study),
         Command::Demo(args) => demo::run(&args),
@@ -38,9 +40,15 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(text) => {
-            // A closed pipe (`| head`) is the reader's choice, not an error.
-            let _ = writeln!(std::io::stdout(), "{}", text.trim_end());
-            ExitCode::SUCCESS
+            let mut out = std::io::stdout();
+            match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {
+                // A closed pipe (`| head`) is the reader's choice, not an error.
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                    let _ = writeln!(std::io::stderr(), "error: cannot print the answer: {error}");
+                    ExitCode::FAILURE
+                }
+                _ => ExitCode::SUCCESS,
+            }
         }
         Err(error) => {
             let _ = writeln!(std::io::stderr(), "error: {error:#}");

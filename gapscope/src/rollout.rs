@@ -40,7 +40,11 @@ pub fn run(args: &Rollout) -> Result<String> {
         Some(file) => file.clone(),
         None => output::new_folder(first.parent().unwrap_or(std::path::Path::new("")), "rollout")?.join("rollout.html"),
     };
+    if let Some(folder) = page.parent() {
+        output::writable(folder)?;
+    }
     let loaded = load(&args.input)?;
+    loaded.warn();
     let contenders = contenders(args, &loaded.model)?;
     let options =
         RolloutOptions { horizon: args.horizon, tolerance: args.tolerance, fit: args.fit_start, starts: args.starts };

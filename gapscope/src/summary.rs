@@ -2,6 +2,7 @@
 
 mod change;
 
+use crate::input::fault_line;
 use crate::report::terminal::{INDENT, Paint, WIDTH, block, blocks, column, cut, cut_to, fill, pad, wrap};
 use crate::report::{
     NONE, capital, changed, count, effect, estimate, figure, headline, implied_unit, interval, is_above_floor,
@@ -20,6 +21,10 @@ const EFFECTS: usize = 5;
 const REGIMES: usize = 3;
 const FINDINGS: usize = 3;
 const LOGS: usize = 12;
+/// A rollout further than this from its log, rad or m, goes nowhere.
+const LOST: f64 = 1e3;
+/// Lines that a fault, a doubt or a finding takes at most.
+const LINES: usize = 30;
 
 /// The diagnosis in at most some 25 lines: verdict, which, where, how far, notes, and where the report is.
 pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, color: bool) -> String {
@@ -33,8 +38,16 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, color: bool) -> String
         with_unit(&plain(data.duration), "s"),
         with_unit(&plain(data.rate), "Hz")
     ))];
+    for fault in &data.faults {
+        block(&mut lines, &paint, "Fault", &wrap(&fault_line(fault), LINES));
+    }
+    for doubt in &data.doubts {
+        block(&mut lines, &paint, "In doubt", &wrap(&capital(&doubt.question), LINES));
+    }
     let label = verdict(diagnosis.verdict).to_uppercase();
-    lines.push(format!("{}  {}", paint.verdict(&label, diagnosis.verdict), headline(diagnosis)));
+    let mended = data.faults.iter().any(|fault| fault.mended);
+    let of = if mended { "Of the mended logs: " } else { "" };
+    lines.push(format!("{}  {of}{}", paint.verdict(&label, diagnosis.verdict), headline(diagnosis)));
     lines.push(String::new());
     if diagnosis.verdict != Verdict::NotExcited {
         block(&mut lines, &paint, "Which", &which(diagnosis, &paint));
@@ -46,7 +59,7 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, color: bool) -> String
             &how_far(&diagnosis.shrink, &diagnosis.gap.regimes, !diagnosis.effects.is_empty()),
         );
     }
-    block(&mut lines, &paint, "Notes", &notes(diagnosis));
+    block(&mut lines, &paint, "Notes", &notes(diagnosis, color));
     if let (Verdict::NoGap, Some(line)) = (diagnosis.verdict, power_line(&diagnosis.power)) {
         block(&mut lines, &paint, "Power", &wrap(&line, 2));
     }
@@ -262,7 +275,7 @@ fn how_far(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Vec<String> 
     for h in shown.into_iter().filter_map(|i| shrink.rollout.get(i)).filter(|h| changed(&h.change)) {
         cells.push((
             format!("rollout {} s", plain(h.horizon)),
-            Cells::of(&h.change, figure),
+            Cells::of(&h.change, rolled_out),
             format!("   {} rms", motion_unit(regimes, false)),
         ));
     }
@@ -276,7 +289,13 @@ fn how_far(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Vec<String> 
     cells.iter().map(row).collect()
 }
 
-fn notes(diagnosis: &Diagnosis) -> Vec<String> {
+/// The error of a rollout; one that has left every robot's reach says so.
+fn rolled_out(error: f64) -> String {
+    if error.is_finite() && error < LOST { figure(error) } else { "diverges".into() }
+}
+
+/// On a terminal the gravest findings, wrapped; elsewhere all of them.
+fn notes(diagnosis: &Diagnosis, terminal: bool) -> Vec<String> {
     let findings = &diagnosis.data.findings;
     let mut rows = vec![];
     let best = diagnosis.alternatives.iter().max_by(|a, b| a.probability.total_cmp(&b.probability));
@@ -288,8 +307,9 @@ fn notes(diagnosis: &Diagnosis) -> Vec<String> {
     if matches!(diagnosis.verdict, Verdict::PartlyExplained | Verdict::UnknownEffect) {
         rows.extend(wrap(&words_of_the_rest(&diagnosis.unexplained, &diagnosis.joints), 2));
     }
-    rows.extend(findings.iter().take(FINDINGS).map(|text| cut_to(text, WIDTH - INDENT)));
-    rest(rows, findings.len(), FINDINGS, "finding")
+    let shown = if terminal { FINDINGS } else { findings.len() };
+    rows.extend(findings.iter().take(shown).flat_map(|text| wrap(text, LINES)));
+    rest(rows, findings.len(), shown, "finding")
 }
 
 /// Appends a count of what is not shown.

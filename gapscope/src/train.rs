@@ -68,7 +68,9 @@ pub fn run(args: &Train) -> Result<String> {
     if !(args.dt > 0.0 && args.dt.is_finite()) {
         bail!("--dt is {}; expected a positive time in s", args.dt);
     }
+    output::writable(&out)?;
     let loaded = load(&args.input)?;
+    loaded.warn();
     let (mut train, mut held_out) = (Transitions::default(), Transitions::default());
     for (i, episode) in loaded.episodes.iter().enumerate() {
         let seen = transitions(episode, args.dt);

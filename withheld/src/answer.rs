@@ -16,6 +16,20 @@ pub struct Answer {
     /// How far the gap shrinks, as the diagnosis predicts it.
     #[serde(default)]
     pub shrink: Value,
+    /// What it says of the data.
+    #[serde(default)]
+    pub data: Said,
+}
+
+/// What an answer says of the data.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+pub struct Said {
+    /// What is wrong with it beyond doubt.
+    #[serde(default)]
+    pub faults: Vec<Value>,
+    /// What may be.
+    #[serde(default)]
+    pub doubts: Vec<Value>,
 }
 
 /// One effect that a diagnosis names.

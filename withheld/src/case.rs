@@ -1,6 +1,7 @@
 //! One case: a robot with effects drawn for it, its logs, and how visible the effects are in them.
 
 use crate::draw::{Difficulty, Drawn, Sort, draw};
+use crate::fault::{FAULTS, any_fault, spoil};
 use crate::outside::Disturbed;
 use crate::robot::Robot;
 use crate::sight::{see, shows};
@@ -26,6 +27,10 @@ const ASTRAY: f64 = 0.6;
 const CLIPPED: f64 = 0.005;
 /// What each draw leaves of the share that the last one clipped: a robot clipped too hard falls.
 const MILDER: f64 = 0.8;
+/// Part of the cases of a faulty bank whose logs have a fault.
+const FAULTY: f64 = 2.0 / 3.0;
+/// Parts the numbers that faults are drawn from, from those of the robot.
+const FAULT_SEED: u64 = 0xfa17;
 /// Joints of greatest effort among which a saturation picks its own.
 const STRONGEST: usize = 3;
 
@@ -36,6 +41,8 @@ pub struct CaseSpec {
     pub sorts: Vec<Sort>,
     /// How used the arm is; `None` where everything but the effects is as in its URDF.
     pub used: Option<Used>,
+    /// Whether its logs may be wrong.
+    pub faulty: bool,
     /// Its seed.
     pub seed: u64,
     /// How large the effects are.
@@ -120,7 +127,14 @@ fn attempt(
             (robot, drawn, recipe(random))
         }
     };
-    let robot = &robot;
+    // Faults have numbers of their own, so that the healthy twin is the same robot on the same motion.
+    let mut chance = Pcg64::seed_from_u64(spec.seed ^ FAULT_SEED);
+    let wrong = spec.faulty && chance.random_bool(FAULTY);
+    let fault = if wrong { any_fault(&FAULTS, &robot.model, spec.episodes, &mut chance) } else { None };
+    let robot = &match fault.as_ref().and_then(|fault| fault.gravity) {
+        Some(gravity) => Robot { model: robot.model.clone().with_gravity(gravity.into()), ..robot },
+        None => robot,
+    };
     let motor_encoders = drawn.iter().any(|drawn| drawn.motor_encoder);
     let recipe = Recipe { seconds: spec.seconds, motor_encoders, ..recipe };
     let quiet = Recipe { sensors: Sensors::IDEAL, ..recipe };
@@ -173,7 +187,7 @@ fn attempt(
     if kinds.is_empty() {
         kinds.push("none".into());
     }
-    let truth = Truth {
+    let mut truth = Truth {
         robot: robot.name.clone(),
         seed: spec.seed,
         noise: [position_noise, speed_noise, sensors.effort_noise],
@@ -183,8 +197,15 @@ fn attempt(
         motion: spec.used.and_then(|_| Some(serde_json::to_value(recipe.motion).ok()?.as_str()?.to_owned())),
         kinds,
         effects: drawn.into_iter().map(|drawn| drawn.sealed).collect(),
+        faulty: spec.faulty,
+        fault,
     };
     let tests = logs.split_off(spec.episodes);
+    while let Some(fault) = &mut truth.fault
+        && !spoil(fault, &robot.model, &mut logs, &mut chance)
+    {
+        truth.fault = any_fault(&FAULTS[..FAULTS.len() - 1], &robot.model, spec.episodes, &mut chance);
+    }
     Ok(Ok(Case { urdf: robot.urdf.clone(), episodes: logs, tests, truth }))
 }
 
@@ -252,7 +273,36 @@ mod tests {
     }
 
     fn spec(sorts: Vec<Sort>, seed: u64) -> CaseSpec {
-        CaseSpec { sorts, used: None, seed, difficulty: Difficulty::Mixed, seconds: 3.0, episodes: 1, tests: 1 }
+        CaseSpec {
+            sorts,
+            used: None,
+            faulty: false,
+            seed,
+            difficulty: Difficulty::Mixed,
+            seconds: 3.0,
+            episodes: 1,
+            tests: 1,
+        }
+    }
+
+    #[test]
+    fn a_fault_is_put_on_the_logs_of_the_healthy_twin_and_not_on_the_tests() {
+        let robot = robot("double_pendulum");
+        let mut faults = std::collections::BTreeSet::new();
+        for seed in 0..6 {
+            let twin = CaseSpec { faulty: true, ..spec(vec![], seed) };
+            let case = make_case(&robot, &twin).unwrap();
+            let healthy = make_case(&robot, &spec(vec![], seed)).unwrap();
+            let kind = case.truth.fault.as_ref().map(|fault| fault.kind);
+            faults.insert(kind);
+            if kind != Some(gapscope_datasets::FaultKind::Gravity) {
+                assert_eq!(case.tests, healthy.tests, "{seed}");
+            }
+            // A fault may leave out what the log has beside, but it never leaves the log as it is.
+            assert_eq!(case.episodes == healthy.episodes, kind.is_none(), "{seed} {kind:?}");
+            assert!(case.truth.faulty && !healthy.truth.faulty);
+        }
+        assert!(faults.contains(&None) && faults.len() > 2, "{faults:?}");
     }
 
     #[test]

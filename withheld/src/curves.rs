@@ -109,6 +109,7 @@ mod tests {
             seconds: 1.0,
             error: None,
             arm: None,
+            fault: None,
         }
     }
 

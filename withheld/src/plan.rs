@@ -51,6 +51,9 @@ pub struct Plan {
     /// Used arms: then `cases` have a further effect of the catalogue, `unknown` a law outside it, and `none` nothing further.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub used: Option<Used>,
+    /// Whether the logs of two cases in three have a fault, drawn at random.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub faulty: bool,
 }
 
 /// Parts of a bank of used arms that have a further effect of the catalogue, and one outside it.
@@ -92,6 +95,7 @@ impl Plan {
         let spec = |(i, sorts)| CaseSpec {
             sorts,
             used: self.used,
+            faulty: self.faulty,
             seed: self.seed.wrapping_mul(1000).wrapping_add(i as u64),
             difficulty: self.difficulty,
             seconds: self.seconds,
@@ -147,6 +151,7 @@ mod tests {
             episodes: 4,
             tests: 2,
             used: None,
+            faulty: false,
         }
     }
 

@@ -3,6 +3,7 @@
 use crate::arm::ArmJudgement;
 use crate::arm_totals::{ArmTotals, arm_totals};
 use crate::curves::{CalibrationBin, VisibilityBin, calibration, expected_error, visibility};
+use crate::fault_judge::{FaultJudgement, FaultTotals, fault_totals};
 use crate::judge::Judgement;
 use crate::statistics::{mean_rounded, median, rounded};
 use crate::truth::{Group, SealedEffect, Truth, is_unknown};
@@ -29,6 +30,9 @@ pub struct Score {
     /// The figures over used arms, by how used they are; nothing where there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub arms: Vec<ArmTotals>,
+    /// The figures over cases whose logs may be wrong; nothing where there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faults: Option<FaultTotals>,
     /// Case by case.
     pub cases: Vec<CaseScore>,
 }
@@ -58,6 +62,9 @@ pub struct CaseScore {
     /// How the answer did on a used arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmJudgement>,
+    /// How the answer did on logs that may be wrong.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fault: Option<FaultJudgement>,
 }
 
 /// Figures over all cases. Means and medians are over all groups but the undetectable, and `None` over nothing.
@@ -137,7 +144,15 @@ impl CaseScore {
             seconds,
             error,
             arm: None,
+            fault: None,
         }
+    }
+
+    /// The same with what the answer says of the data.
+    #[must_use]
+    pub fn with_fault(mut self, fault: Option<FaultJudgement>) -> CaseScore {
+        self.fault = fault;
+        self
     }
 
     /// The same with what the answer comes to on a used arm.
@@ -164,7 +179,8 @@ impl Score {
         let (calibration, visibility) = (calibration(&cases), visibility(&cases));
         let totals = totals(&cases, &calibration);
         let arms = arm_totals(&cases);
-        Score { schema: SCORE_SCHEMA.to_owned(), totals, banks, calibration, visibility, arms, cases }
+        let faults = fault_totals(&cases.iter().filter_map(|case| case.fault).collect::<Vec<_>>());
+        Score { schema: SCORE_SCHEMA.to_owned(), totals, banks, calibration, visibility, arms, faults, cases }
     }
 
     /// Labels and counts of sealed effect against the one named first; the catalogue's order, then none, unknown and what

@@ -1,5 +1,6 @@
 //! What a withheld case keeps sealed.
 
+use crate::fault::SealedFault;
 use gapscope_effects::Kind;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -31,6 +32,12 @@ pub struct Truth {
     /// Family of a used arm's motions, by name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<String>,
+    /// Whether the logs may be wrong.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub faulty: bool,
+    /// What is wrong with them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fault: Option<SealedFault>,
 }
 
 /// How used an arm is.

@@ -19,7 +19,7 @@ pub(super) struct Dynamics<'a> {
 
 /// How a torque explains an effort, with viscous and dry friction and an offset beside it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Fit {
+pub(crate) struct Fit {
     /// Effort per torque.
     pub gain: f64,
     /// Correlation of the two, friction and offset taken out.
@@ -117,7 +117,7 @@ fn running_sums(effort: &[f64], disturbance: Option<&[f64]>) -> Vec<f64> {
 
 /// Fits effort by torque, speed, the sign of speed and an offset, and by `beside`. `None` where effort or torque do not
 /// vary.
-pub(super) fn fit(effort: &[f64], torque: &[f64], speed: &[f64], beside: Option<&[f64]>) -> Option<Fit> {
+pub(crate) fn fit(effort: &[f64], torque: &[f64], speed: &[f64], beside: Option<&[f64]>) -> Option<Fit> {
     let slow = 0.1 * crate::robust::rms(speed);
     let ones = vec![1.0; effort.len()];
     let dry: Vec<f64> = speed.iter().map(|v| if slow > 0.0 { (v / slow).tanh() } else { 0.0 }).collect();
@@ -166,7 +166,9 @@ fn remove(column: &mut [f64], base: &[Vec<f64>]) {
 pub(super) fn check(logs: &Logs, scale: Option<&[f64]>, report: &mut Report) {
     let n = logs.model.dof();
     let mut constant = Vec::new();
-    for j in 0..n {
+    // What was left out has been said already.
+    let known = |j: &usize| !logs.episodes.iter().any(|episode| episode.effort_unknown.contains(j));
+    for j in (0..n).filter(known) {
         let ranges: Vec<(f64, f64)> = logs.episodes.iter().map(|episode| range(&episode.effort[j])).collect();
         if ranges.iter().all(|(low, high)| low == high) {
             constant.extend(ranges.iter().enumerate().map(|(e, (low, _))| Case { episode: e, joint: j, value: *low }));

@@ -10,7 +10,7 @@ const LONGEST_DELAY: f64 = 0.08;
 
 /// How a velocity relates to a position: over windows, its integral against the way gone.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Relation {
+pub(crate) struct Relation {
     /// Velocity per derivative of position: 1 where all is well.
     pub slope: f64,
     /// Correlation of the two.

@@ -235,7 +235,50 @@ fn logs_too_short_give_no_episode_and_no_error() {
     let text: String = log(HEADER, plain).lines().take(8).map(|line| format!("{line}\n")).collect();
     let (samples, findings) = read(text).unwrap();
     assert!(samples == 0 && findings[0].contains("only 7 samples"), "{findings:?}");
-    assert_eq!(read(format!("{HEADER}\n")).unwrap().0, 0);
+}
+
+#[test]
+fn a_header_alone_is_an_error() {
+    error(format!("{HEADER}\n"), LogErrorKind::Empty, Some(1), None);
+}
+
+#[test]
+fn comments_units_and_separators_behind_each_cell() {
+    let text = log(HEADER, plain);
+    assert_eq!(read(format!("# made by a logger\n# at noon\n{text}")).unwrap(), (40, vec![]));
+    let trailing = text.replace('\n', ",\n");
+    assert_eq!(read(&trailing).unwrap(), (40, vec![]), "a comma behind each cell");
+    assert_eq!(read(trailing.replacen(",\n", "\n", 1)).unwrap(), (40, vec![]), "but for the header");
+    assert_eq!(read(text.replacen('\n', ",\n", 1)).unwrap(), (40, vec![]), "and in the header alone");
+    let below = |row: &str| text.replacen('\n', &format!("\n{row}\n"), 1);
+    let line = error(below(HEADER), LogErrorKind::NotANumber, Some(2), Some("time"));
+    assert!(line.contains("header stands here once more"), "{line}");
+    let (samples, findings) = read(below("s,rad,rad,Nm,Nm")).unwrap();
+    assert!(samples == 40 && findings[0].contains("read as units"), "{findings:?}");
+    let with_comment = error(
+        format!("# hello\n{text}").replacen("position", "positoin", 1),
+        LogErrorKind::MissingJoint,
+        Some(1),
+        Some("position.a"),
+    );
+    assert!(with_comment.contains("no column feeds"), "{with_comment}");
+}
+
+#[test]
+fn names_that_are_nearly_right_and_those_of_another_robot() {
+    let joints = vec!["slider".to_owned()];
+    let (_folder, paths) = folder_of(&[("run.csv", log("time,position.slidr,effort.slider", plain).as_bytes())]);
+    let line = read_logs(&paths, &joints, &ReadOptions::default()).unwrap_err().to_string();
+    assert!(line.contains("--map \"position.slider=position.slidr\""), "{line}");
+    let line = error(
+        log("time,position.x1,position.x2,effort.x1,effort.x2", plain),
+        LogErrorKind::MissingJoint,
+        Some(1),
+        Some("position.a"),
+    );
+    assert!(line.contains("`x1`, `x2`") && line.contains("position.a=position.x1"), "{line}");
+    let line = error(log("0,0.1,0.2,1,2", plain), LogErrorKind::NoHeader, Some(1), None);
+    assert!(line.contains("position.b,effort.a,effort.b"), "{line}");
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod bad_input;
 mod check_rules;
 #[path = "../common/mod.rs"]
 mod common;
+mod faults;
 mod formats;
 mod fuzz;
 mod generate;

@@ -1,6 +1,8 @@
 //! Logs of real and simulated robots read as they stand, and give the findings that are known of them.
 
-use gapscope_datasets::{ColumnMap, Episode, LogErrorKind, ReadOptions, check_logs, read_logs, resample};
+use gapscope_datasets::{
+    ColumnMap, Episode, Faults, LogErrorKind, ReadOptions, check_logs, find_faults, read_logs, resample,
+};
 use gapscope_dynamics::{Finding, Model};
 use std::path::{Path, PathBuf};
 
@@ -115,6 +117,18 @@ fn logs_of_the_bank_are_healthy_but_for_limits() {
         let limits =
             |line: &&String| line.contains("velocity limit") || line.contains("the effort is above the URDF's limit");
         assert_eq!(robot.checked.iter().filter(|line| !limits(line)).count(), 0, "{:#?}", robot.checked);
+    }
+}
+
+#[test]
+fn no_healthy_log_has_a_fault() {
+    let sets = ["emps", "tx40", "double_pendulum", "kinova_gen3", "kuka_lwr4"];
+    let data = folder("GAPSCOPE_DATA", "../shared/data").into_iter();
+    let folders = data.flat_map(|data| sets.map(|set| data.join(set))).chain(bank_cases());
+    for folder in folders {
+        let robot = robot(&folder, &ReadOptions { drop_bad_channels: true, ..ReadOptions::default() });
+        let faults = find_faults(&robot.model, &robot.episodes);
+        assert_eq!(faults, Faults::default(), "{}", folder.display());
     }
 }
 

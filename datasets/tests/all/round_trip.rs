@@ -22,6 +22,7 @@ fn episode() -> Episode {
         effort_link: Some(channel(20)),
         temperature: Some(channel(1)),
         disturbance: Some(channel(0)),
+        effort_unknown: Vec::new(),
     };
     episode.effort[0][..6].copy_from_slice(&[0.0, -0.0, f64::MIN_POSITIVE, 5e-324, f64::MAX, 1e15]);
     episode

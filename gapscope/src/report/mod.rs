@@ -89,6 +89,8 @@ fn header(diagnosis: &Diagnosis, sentences: &[String; 3]) -> Markup {
                 "Gap between simulator and robot · " b { (diagnosis.robot) } " · " (count(data.episodes, "episode")) ", "
                 (with_unit(&plain(data.duration), "s")) " at " (with_unit(&plain(data.rate), "Hz"))
             }
+            @for fault in &data.faults { p.fault role="alert" { b { "Fault of the data. " } (crate::input::fault_line(fault)) } }
+            @for doubt in &data.doubts { p.fault { b { "In doubt. " } (doubt.question) } }
             h1 class=(tone(diagnosis.verdict)) { (words::verdict(diagnosis.verdict)) }
             p.meaning { (words::verdict_meaning(diagnosis.verdict)) }
             dl.answer {

@@ -29,6 +29,9 @@ pub fn html(score: &Score) -> String {
             @if let Some(arms) = figures::arms(score) {
                 (section("Used arms", "Friction, links, rotors and biases are off on most of them, and one further effect may be beside that; 95 % intervals in brackets.", rows(&arms)))
             }
+            @if let Some(faults) = figures::faults(score) {
+                (section("Wrong data", "Two cases in three have one thing wrong with their logs: a unit, a sign, a clock, an effort not recorded, …", rows(&faults)))
+            }
             (section("Which is taken for which", "Sealed effect by row, the one named first by column; one effect, or none, a case.",
                 html! { div.scroll tabindex="0" role="region" aria-label="Confusion matrix" { (inline(&pictures::confusion(score))) } }))
             (section("Confidence", "Share of the effects named with some confidence that are there; on the line, the confidence means what it says.",

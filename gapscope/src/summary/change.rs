@@ -41,6 +41,8 @@ impl Cells {
     /// A change, its figures printed by `print`.
     pub fn of(change: &Change, print: impl Fn(f64) -> String) -> Self {
         let shrink = match (change.shrink, change.ci95) {
+            // Of a rollout that goes nowhere no part can be told.
+            (Some(part), _) if part < -1e3 => "worse".into(),
             (Some(part), ends) => {
                 let ends = ends.map_or(String::new(), change_interval);
                 format!("{}{ends}", change_sign(part))

@@ -69,6 +69,7 @@ fn plan(args: &MakeBank) -> Result<Plan> {
         seconds: args.seconds,
         episodes: args.episodes,
         tests: args.tests,
+        faulty: args.faulty,
         used: args.used.map(Used::try_from).transpose().map_err(anyhow::Error::msg)?,
     };
     if let Some(used) = plan.used {

@@ -6,7 +6,7 @@ use crate::cli::ScoreBank;
 use crate::{output, report};
 use anyhow::{Context, Result, bail};
 use gapscope_dynamics::Model;
-use gapscope_withheld::{Answer, CaseScore, Score, impossible_bodies, judge, judge_arm};
+use gapscope_withheld::{Answer, CaseScore, Score, impossible_bodies, judge, judge_arm, judge_fault};
 use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -64,8 +64,11 @@ pub fn run(args: &ScoreBank) -> Result<String> {
     let judged = cases.iter().zip(trials).map(|(case, trial)| {
         let truth = case.truth()?;
         let judgement = judge(&truth, trial.answer.as_ref(), trial.evaluation.as_ref());
+        let fault = judge_fault(&truth, trial.answer.as_ref());
         let arm = judge_arm(&truth, trial.answer.as_ref(), &judgement, trial.impossible);
-        Ok(CaseScore::new([&case.bank, &case.name], &truth, judgement, trial.seconds, trial.error).on_arm(arm))
+        Ok(CaseScore::new([&case.bank, &case.name], &truth, judgement, trial.seconds, trial.error)
+            .on_arm(arm)
+            .with_fault(fault))
     });
     let score = Score::new(judged.collect::<Result<_>>()?);
     let json = serde_json::to_string_pretty(&score)?;

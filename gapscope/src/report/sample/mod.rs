@@ -65,6 +65,8 @@ pub fn explained() -> Case {
             duration: 40.0,
             rate: 500.0,
             band: 15.0,
+            faults: vec![],
+            doubts: vec![],
             findings: vec![
                 "velocity.panda_joint3 is missing: derived from position".into(),
                 "URDF: link panda_hand has no inertial; taken as massless, and this is a long remark that runs over the width of a terminal".into(),

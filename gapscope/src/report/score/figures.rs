@@ -96,6 +96,22 @@ fn arm(t: &ArmTotals) -> Vec<(&'static str, String)> {
     ]
 }
 
+/// The table of what is said of the data; `None` where no logs may be wrong.
+pub fn faults(score: &Score) -> Option<Table> {
+    let t = score.faults.as_ref()?;
+    let of = |share: Option<f64>, n: usize| share.map_or(NONE.into(), |share| format!("{} of {n}", percent(share)));
+    let named = t.named.map_or(0, |share| (share * t.faulty as f64).round() as usize);
+    let rows = vec![
+        ("fault named, with its joints and its log", of(t.named, t.faulty)),
+        ("  its factor or shift right", of(t.sized, named)),
+        ("confident answers on faulty logs without a fault said", format!("{} of {}", t.confident, t.faulty)),
+        ("healthy logs: a fault said", format!("{} of {}", t.false_faults, t.healthy)),
+        ("  mended", format!("{} of {}", t.false_mends, t.healthy)),
+        ("  a question asked", format!("{} of {}", t.questions, t.healthy)),
+    ];
+    Some(Table { columns: vec!["all".into()], rows: rows.into_iter().map(|(name, cell)| (name, vec![cell])).collect() })
+}
+
 /// A case in which the set of effects or the verdict is not what was sealed.
 #[derive(Debug)]
 pub struct Miss {

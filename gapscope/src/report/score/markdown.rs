@@ -1,6 +1,6 @@
 //! A score as a page of documentation, its pictures in files beside it.
 
-use super::figures::{Table, arms, misses, table};
+use super::figures::{Table, arms, faults, misses, table};
 use gapscope_withheld::{DETECTABLE, Score};
 use std::fmt::Write;
 
@@ -21,6 +21,10 @@ pub fn page(score: &Score, call: &str, pictures: [&str; 3]) -> String {
              of how many, with their 95 % score interval (Wilson); means and medians say of how many values.\n\n",
         );
         text.push_str(&rows(&arms));
+    }
+    if let Some(faults) = faults(score) {
+        text.push_str("\n## Wrong data\n\nTwo cases in three have one thing wrong with their logs.\n\n");
+        text.push_str(&rows(&faults));
     }
     // Writing to a string cannot fail.
     let _ = write!(

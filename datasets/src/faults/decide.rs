@@ -1,0 +1,237 @@
+//! Which account of the motion is the likeliest, and whether that is beyond doubt.
+
+use super::change::Change;
+use super::effort;
+use super::motion::{self, Account, Kind, Scene};
+use super::sample::Sample;
+use super::weigh::{Weighed, weigh_either};
+use super::words::{per_cent, phrase};
+use super::{Doubt, Fault, FaultKind};
+use crate::check::Logs;
+use crate::time_stamps::LONGEST_STEP;
+use gapscope_dynamics::Model;
+
+/// Places of the first look.
+const GLANCE: usize = 150;
+/// Accounts that are weighed, the likeliest at the first look.
+const MOST: usize = 9;
+/// By how much, in nats, an account must be the likelier one for no doubt to be left, ...
+pub(crate) const SURE: f64 = 15.0;
+/// ... and for a question.
+const LIKELY: f64 = 8.0;
+/// By how much it must be likelier than any other account that is not as logged.
+const APART: f64 = 6.0;
+/// What an account costs by itself, in nats: units, zeros, clocks and orders are tried by the hundred.
+const COST: f64 = 5.0;
+/// What a scale of the effort costs beside an account of the motion, in nats: of mirror images, the one without.
+const SCALE_COST: f64 = 8.0;
+/// What a clock gains, in nats, by steps of time that no log has, or by velocities that are all off by its factor; and a unit by
+/// each joint that it brings back from far beyond its limits.
+const BESIDE: f64 = 30.0;
+/// Zeros off by less than this are an effect, rad.
+const ZERO: f64 = 20.0 * std::f64::consts::PI / 180.0;
+/// An account is none where it leaves more than this of the effort, as a geometric mean of squared shares.
+const EXPLAINS: f64 = 0.45;
+/// As logged some joint must leave more than this of its effort, squared, for a fault to be beyond doubt, ...
+const NOTABLE: f64 = 0.05;
+/// ... or the log must ask this much more of the robot's bodies and rotors, in nats.
+const MUCH: f64 = 4.0 * SURE;
+
+/// How much of the effort an account leaves, as a geometric mean over the joints that count.
+pub(crate) fn left(weighed: &Weighed, active: &[bool]) -> f64 {
+    let logs: Vec<f64> =
+        weighed.unexplained.iter().zip(active).filter(|(_, active)| **active).map(|(u, _)| u.min(1.0).ln()).collect();
+    (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
+}
+
+/// What a decision rests on.
+pub(crate) struct Decision<'a> {
+    /// The robot.
+    pub model: &'a Model,
+    /// Whether one log speaks for itself alone: it must be clearer then.
+    pub alone: bool,
+}
+
+impl Decision<'_> {
+    /// The likeliest account as a fault, where it is needed and beyond doubt; a question, where it is in doubt.
+    pub fn next(&self, logs: &Logs, sample: &Sample, active: &[bool]) -> Option<Result<Fault, Doubt>> {
+        let glance = sample.thinned(sample.len().div_ceil(GLANCE));
+        let n = logs.model.dof();
+        let moves: Vec<bool> = (0..n).map(|j| logs.traits.iter().any(|traits| traits[j].moves())).collect();
+        let range = (0..n).map(|j| {
+            logs.traits.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), traits| {
+                (low.min(traits[j].low), high.max(traits[j].high))
+            })
+        });
+        let scene = Scene {
+            model: self.model,
+            sample: &glance,
+            active,
+            moves: &moves,
+            range: range.collect(),
+            slow: logs.dt.iter().any(|dt| *dt > LONGEST_STEP),
+            velocity: motion::velocity_slope(logs),
+        };
+        let logged = self.weighed(self.model, sample, active);
+        let plain = logged.0.is_plain(active) && scene.far(&scene.range) == 0;
+        if plain && !scene.slow && !scene.velocity_asks() {
+            return None;
+        }
+        let base = scene.as_logged();
+        let accounts = scene.accounts();
+        let slow = scene.slow;
+        let mut best: Vec<(f64, Account, Weighed)> = accounts
+            .into_iter()
+            .filter(|account| account.look < base - 0.4 || (slow && account.kind == Kind::Clock))
+            .take(MOST)
+            .map(|account| {
+                let mut changed = sample.clone();
+                account.changes.iter().for_each(|change| motion::apply(change, &mut changed));
+                let model = match account.gravity {
+                    Some(gravity) => self.model.clone().with_gravity(gravity),
+                    None => self.model.clone(),
+                };
+                let (weighed, extra) = self.weighed(&model, &changed, active);
+                // What limits and velocity say counts as in the first look.
+                let beside = match account.kind {
+                    Kind::Clock if slow => BESIDE,
+                    Kind::Clock if scene.velocity_says(account.value) => BESIDE,
+                    // Positions that no robot reaches, and would with it.
+                    _ => BESIDE * f64::from(account.inside),
+                };
+                // Another size of gravity is another planet: a clock is the likelier account.
+                let size = account.kind == Kind::Gravity && (account.value - 1.0).abs() > 0.1;
+                let unlikely = if size { 3.0 * COST } else { 0.0 };
+                (weighed.score - extra - COST - unlikely + beside, account, weighed)
+            })
+            .collect();
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (score, account, weighed) = best.first()?;
+        let margin = score - (logged.0.score - logged.1);
+        let small = match account.kind {
+            Kind::Zero => logs.is_prismatic(account.joints[0]) || account.value.abs() < ZERO,
+            Kind::Scale | Kind::Clock => (effort::GAINS.0..effort::GAINS.1).contains(&account.value),
+            Kind::Gravity => account.gravity.is_some_and(|gravity| {
+                let own = self.model.gravity();
+                (gravity - own).length() < ZERO * own.length()
+            }),
+            Kind::Sign | Kind::Axis | Kind::Order => false,
+        };
+        if small || margin < LIKELY {
+            return None;
+        }
+        let (before, after) = (left(&logged.0, active), left(weighed, active));
+        let (sure, most) = if self.alone { (2.0 * SURE, 0.6 * EXPLAINS) } else { (SURE, EXPLAINS) };
+        // Some joint must be far off as logged, and no longer so.
+        let unexplained = |of: &Weighed, j: usize| of.unexplained[j].min(1.0);
+        let tells = |j: usize| {
+            let (before, after) = (unexplained(&logged.0, j), unexplained(weighed, j));
+            active[j] && before > 0.08 && after < 0.5 * before
+        };
+        // A clock, a zero and a sign may show in what the log as it is asks of bodies and rotors.
+        let asks = logged.0.asked - weighed.asked;
+        let bent = match account.kind {
+            Kind::Clock => slow || asks > SURE || (scene.velocity_says(account.value) && after < 1.1 * before),
+            Kind::Zero | Kind::Sign | Kind::Axis => asks > 2.0 * SURE,
+            Kind::Scale => account.inside > 0 && after < 1.1 * before,
+            _ => false,
+        };
+        let clearly = after < 0.1 && after < 0.2 * before;
+        let notable = account.kind == Kind::Clock
+            || account.inside > 0
+            || asks > MUCH
+            || (0..n).any(|j| active[j] && logged.0.unexplained[j] > NOTABLE);
+        let explains = after < most && (after < 0.6 * before && (0..n).any(tells) || clearly || bent);
+        // A turned base and the zero or the sign of its first joint are one and the same.
+        let twins = |a: Kind, b: Kind| a == Kind::Gravity && matches!(b, Kind::Zero | Kind::Sign | Kind::Axis);
+        let other = |other: &Account| other.kind != account.kind || other.joints != account.joints;
+        let rival = best.iter().skip(1).find(|(_, rival, _)| other(rival) && !twins(rival.kind, account.kind));
+        let apart = rival.is_none_or(|(other, ..)| score - other > APART);
+        if let Some((_, twin, left_by)) = rival.filter(|(_, rival, _)| !apart && twins(account.kind, rival.kind))
+            && margin > sure
+            && explains
+            && notable
+        {
+            return Some(Ok(self.fault(logs, twin, before, left(left_by, active))));
+        }
+        if margin > sure && explains && apart && notable {
+            let account = self.sharpened(logs, sample, active, account.clone());
+            return Some(Ok(self.fault(logs, &account, before, after)));
+        }
+        let mut question = format!(
+            "{}? The model would then leave {} of the effort, squared, not {}",
+            phrase(logs, account),
+            per_cent(after),
+            per_cent(before)
+        );
+        if let Some((_, other, _)) = rival.filter(|_| !apart) {
+            question += &format!("; or {}", phrase(logs, other));
+        }
+        let joints = account.joints.iter().map(|&j| logs.model.joints()[j].name.clone()).collect();
+        (explains && margin > sure).then_some(Err(Doubt { question, joints, effects: Vec::new() }))
+    }
+
+    /// An account with whatever scale of the efforts suits it, and what those scales cost.
+    pub fn weighed(&self, model: &Model, sample: &Sample, active: &[bool]) -> (Weighed, f64) {
+        let scales = effort::first_scales(model, sample, active);
+        let cost = scales_cost(&scales, active);
+        let plain = weigh_either(model, sample, &vec![1.0; scales.len()], active);
+        if cost == 0.0 {
+            return (plain, 0.0);
+        }
+        let (scales, _) = effort::fine_scales(model, sample, scales, active);
+        let scaled = weigh_either(model, sample, &scales, active);
+        if scaled.score - cost > plain.score { (scaled, cost) } else { (plain, 0.0) }
+    }
+
+    fn fault(&self, logs: &Logs, account: &Account, before: f64, after: f64) -> Fault {
+        let kind = match account.kind {
+            Kind::Scale => FaultKind::PositionScale,
+            Kind::Sign => FaultKind::PositionSign,
+            Kind::Axis => FaultKind::AxisSign,
+            Kind::Zero => FaultKind::PositionZero,
+            Kind::Clock => FaultKind::TimeScale,
+            Kind::Gravity => FaultKind::Gravity,
+            Kind::Order => FaultKind::JointOrder,
+        };
+        let evidence = format!(
+            "{}: the model then leaves {} of the effort, squared, not {}",
+            phrase(logs, account),
+            per_cent(after),
+            per_cent(before)
+        );
+        let all: Vec<usize> = (0..logs.episodes.len()).collect();
+        let factor = (account.kind != Kind::Order).then_some(account.value);
+        let mut fault =
+            Fault::new(logs, kind, &account.joints, &all, factor, evidence, with_velocities(logs, &account.changes));
+        fault.gravity = account.gravity.map(|gravity| gravity.to_array());
+        fault
+    }
+}
+
+/// What scales of the effort cost: one that all share as much as one alone.
+pub(crate) fn scales_cost(scales: &[f64], active: &[bool]) -> f64 {
+    let mut distinct: Vec<f64> =
+        scales.iter().zip(active).filter(|(s, active)| **active && **s != 1.0).map(|(s, _)| *s).collect();
+    distinct.sort_by(f64::total_cmp);
+    distinct.dedup();
+    SCALE_COST * distinct.len() as f64
+}
+
+/// What an account undoes, and with it the velocities that were logged in the same terms: they are the derivative of the
+/// position as logged.
+fn with_velocities(logs: &Logs, changes: &[Change]) -> Vec<Change> {
+    let follows = |j: usize| {
+        let mut slopes =
+            logs.relations.iter().filter_map(|relations| relations[j]).map(|relation| relation.slope).peekable();
+        slopes.peek().is_some() && slopes.all(|slope| (slope - 1.0).abs() < 0.1)
+    };
+    let beside = |change: &Change| match *change {
+        Change::Position(j, factor, _) if factor != 1.0 && follows(j) => vec![Change::Velocity(j, factor)],
+        Change::Clock(factor) => {
+            (0..logs.model.dof()).filter(|&j| follows(j)).map(|j| Change::Velocity(j, 1.0 / factor)).collect()
+        }
+        _ => Vec::new(),
+    };
+    changes.iter().cloned().chain(changes.iter().flat_map(beside)).collect()
+}

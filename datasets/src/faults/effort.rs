@@ -1,0 +1,234 @@
+//! What is wrong with the effort by itself: not recorded, noise, without its sign, cut off, in another unit, late.
+
+use super::sample::Sample;
+use super::weigh::{Freedom, Weighed, spread, weigh, weigh_either};
+use crate::check::{Fit, Logs, fit};
+use crate::robust::rms;
+use gapscope_dynamics::Model;
+
+/// A gain between these is an effect, not a fault.
+pub(crate) const GAINS: (f64, f64) = (0.67, 1.5);
+/// A gain between these is as logged at first sight.
+const PLAIN: (f64, f64) = (0.6, 1.7);
+
+/// Why the effort of a joint cannot be used.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Useless {
+    /// It never changes; its value.
+    Constant(f64),
+    /// It changes from sample to sample and follows nothing.
+    Noise,
+}
+
+/// The joints of one log whose effort cannot be used, with why. `torque` is what the model takes for the motion.
+///
+/// Of a joint that hardly bears anything, noise may be all that there is to log: it counts beside a joint that bears more.
+pub(crate) fn useless_joints(logs: &Logs, e: usize, torque: &[Vec<f64>]) -> Vec<(usize, Useless)> {
+    let noise: Vec<Option<Noise>> = (0..torque.len()).map(|j| noise(logs, e, j, &torque[j])).collect();
+    let any = noise.iter().flatten().any(|noise| *noise == Noise::Shows);
+    let of = |(j, noise): (usize, &Option<Noise>)| match noise {
+        Some(Noise::Never(value)) => Some((j, Useless::Constant(*value))),
+        Some(Noise::Shows | Noise::MayBe) if any => Some((j, Useless::Noise)),
+        _ => None,
+    };
+    noise.iter().enumerate().filter_map(of).collect()
+}
+
+/// What an effort looks like from sample to sample, where it looks like no torque.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Noise {
+    /// It never changes; its value.
+    Never(f64),
+    /// It is white where there is a torque to log.
+    Shows,
+    /// It is white.
+    MayBe,
+}
+
+fn noise(logs: &Logs, e: usize, j: usize, torque: &[f64]) -> Option<Noise> {
+    let (episode, traits) = (logs.episodes[e], &logs.traits[e][j]);
+    let effort = &episode.effort[j];
+    if !traits.moves() || episode.effort_unknown.contains(&j) {
+        return None;
+    }
+    let first = *effort.first()?;
+    if effort.iter().all(|x| *x == first) {
+        return Some(Noise::Never(first));
+    }
+    // White from sample to sample, and nothing is left of it in the mean.
+    let mean = effort.iter().sum::<f64>() / effort.len() as f64;
+    let variance = effort.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / effort.len() as f64;
+    let with_next =
+        effort.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum::<f64>() / effort.len() as f64;
+    let block = 25.min(effort.len() / 10).max(1);
+    let means: Vec<f64> = effort.chunks_exact(block).map(|c| c.iter().sum::<f64>() / block as f64 - mean).collect();
+    if with_next.abs() > 0.15 * variance || rms(&means).powi(2) > 2.0 * variance / block as f64 || means.len() < 9 {
+        return None;
+    }
+    let taken = spread(torque);
+    let limit = logs.model.joints()[j].limits.effort.filter(|limit| *limit > 0.0).unwrap_or(f64::INFINITY);
+    let shows = taken > variance / block as f64 || variance.sqrt() > 0.2 * limit;
+    let absent = rms(&means).powi(2) < 0.3 * taken + 1.5 * variance / block as f64;
+    Some(if shows && absent && variance > taken { Noise::Shows } else { Noise::MayBe })
+}
+
+/// Whether a joint whose effort is zero throughout is driven by nothing: then what the motion takes by the model is far
+/// less than its parts.
+pub(crate) fn is_passive(model: &Model, sample: &Sample, j: usize) -> bool {
+    let (torque, weight) = (sample.torque(model), sample.weight(model));
+    let inertia: Vec<f64> = torque[j].iter().zip(&weight[j]).map(|(all, weight)| all - weight).collect();
+    rms(&torque[j]) < 0.25 * rms(&weight[j]).max(rms(&inertia))
+}
+
+/// Which of some joints have efforts that lost their sign: never negative, down to zero again and again, and like the model's
+/// only in size. Beside one of which that is clear, the first two are enough.
+pub(crate) fn absolute_joints(logs: &Logs, sample: &Sample, torque: &[Vec<f64>], joints: &[usize]) -> Vec<usize> {
+    let folded: Vec<usize> = joints.iter().copied().filter(|j| is_folded(logs, *j)).collect();
+    if folded.iter().any(|j| is_absolute(sample, torque, *j)) { folded } else { Vec::new() }
+}
+
+/// Whether a joint's effort is never negative, or never positive, and down to zero again and again, while the joint reverses.
+fn is_folded(logs: &Logs, j: usize) -> bool {
+    let all = || logs.episodes.iter().flat_map(|episode| episode.effort[j].iter().copied());
+    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let size = high.abs().max(low.abs());
+    let one_sided = low >= -1e-3 * size || high <= 1e-3 * size;
+    let near_zero = all().filter(|x| x.abs() < 0.04 * size).count() as f64 > 0.005 * all().count() as f64;
+    one_sided && near_zero && size > 0.0
+}
+
+fn is_absolute(sample: &Sample, torque: &[Vec<f64>], j: usize) -> bool {
+    let Some(plain) = explained(sample, torque, j) else { return false };
+    // The torque with its friction, made from what has a sign, then without.
+    let friction = |k: usize| sample.v[j][k].signum();
+    let best = (0..12)
+        .map(|i| 0.1 * f64::from(i) * rms(&torque[j]))
+        .filter_map(|dry| {
+            let folded: Vec<f64> = (0..sample.len()).map(|k| (torque[j][k] + dry * friction(k)).abs()).collect();
+            fit(&sample.effort[j], &folded, &vec![0.0; sample.len()], None).map(|fit| fit.unexplained)
+        })
+        .fold(1.0, f64::min);
+    best < 0.5 * plain.unexplained && best < 0.4
+}
+
+/// How torque explains a joint's effort, beside friction and a bias.
+pub(crate) fn explained(sample: &Sample, torque: &[Vec<f64>], j: usize) -> Option<Fit> {
+    fit(&sample.effort[j], &torque[j], &sample.v[j], None)
+}
+
+/// Part of a joint's samples that lie on its greatest or least effort to the bit, in runs: where, and how many.
+pub(crate) fn cut_off(logs: &Logs, j: usize) -> Option<(f64, f64)> {
+    let all = || logs.episodes.iter().map(|episode| &episode.effort[j]);
+    let count: usize = all().map(Vec::len).sum();
+    let high = all().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
+    let low = all().flatten().copied().fold(f64::INFINITY, f64::min);
+    let at = |end: f64| all().flat_map(|row| row.windows(3)).filter(|run| run.iter().all(|x| *x == end)).count();
+    [(high, at(high)), (low, at(low))]
+        .into_iter()
+        .filter(|(end, times)| *end != 0.0 && *times as f64 > 0.02 * count as f64)
+        .map(|(end, times)| (end, times as f64 / count.max(1) as f64))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Where the effort lies at its end, how far an account takes it beyond, relative: what a log cut off, the motion still shows.
+pub(crate) fn beyond_the_end(sample: &Sample, predicted: &[f64], j: usize, end: f64) -> f64 {
+    let at: Vec<f64> = (0..sample.len())
+        .filter(|&k| (sample.effort[j][k] - end).abs() < 1e-6 * end.abs())
+        .map(|k| predicted[k] / end - 1.0)
+        .collect();
+    if at.len() < 5 { 0.0 } else { at.iter().sum::<f64>() / at.len() as f64 }
+}
+
+/// What each joint's effort was multiplied by, at first sight: 1 where nothing speaks against it.
+pub(crate) fn first_scales(model: &Model, sample: &Sample, active: &[bool]) -> Vec<f64> {
+    let torque = sample.torque(model);
+    let scale = |j: usize| {
+        let found = explained(sample, &torque, j).filter(|_| active[j]);
+        found
+            .filter(|fit| fit.correlation.abs() > 0.5 && fit.weight * fit.gain.abs() > 0.05)
+            .map(|fit| if (PLAIN.0..PLAIN.1).contains(&fit.gain) { 1.0 } else { fit.gain })
+    };
+    let told: Vec<Option<f64>> = (0..model.dof()).map(scale).collect();
+    if let Some(one) = common(&told, active) {
+        return one;
+    }
+    let each: Vec<f64> = told.iter().map(|scale| scale.unwrap_or(1.0)).collect();
+    if !each.iter().any(|scale| *scale < 0.0) {
+        return each;
+    }
+    // Of a robot whose efforts are all turned round, some joints alone seem to need nothing.
+    let turned: Vec<f64> = active.iter().map(|active| if *active { -1.0 } else { 1.0 }).collect();
+    let score = |scales: &[f64]| weigh_either(model, sample, scales, active).score;
+    if score(&turned) > score(&each) { turned } else { each }
+}
+
+/// One scale for all joints, where most of those that tell one ask for about the same. A wrist that bears little but friction
+/// tells none, and follows.
+fn common(told: &[Option<f64>], active: &[bool]) -> Option<Vec<f64>> {
+    let telling: Vec<f64> = told.iter().flatten().copied().collect();
+    let asked: Vec<f64> = telling.iter().copied().filter(|scale| *scale != 1.0).collect();
+    if asked.len() < 2
+        || 2 * asked.len() <= telling.len()
+        || asked.iter().any(|s| *s < 0.0) != asked.iter().all(|s| *s < 0.0)
+    {
+        return None;
+    }
+    let mut logs: Vec<f64> = asked.iter().map(|s| s.abs().ln()).collect();
+    let middle = crate::robust::median(&mut logs)?;
+    let alike = logs.iter().filter(|s| (*s - middle).abs() < 0.5).count();
+    let scale = asked[0].signum() * middle.exp();
+    (5 * alike >= 4 * asked.len()).then(|| active.iter().map(|active| if *active { scale } else { 1.0 }).collect())
+}
+
+/// Brings scales other than 1 to where they fit best. Returns them with what they leave.
+pub(crate) fn fine_scales(
+    model: &Model,
+    sample: &Sample,
+    mut scales: Vec<f64>,
+    active: &[bool],
+) -> (Vec<f64>, Weighed) {
+    let n = model.dof();
+    let one = (0..n).filter(|&j| active[j]).all(|j| scales[j] == scales[(0..n).find(|&i| active[i]).unwrap_or(0)]);
+    let mut weighed = weigh(model, sample, &scales, active, Freedom::ORDINARY);
+    for _ in 0..4 {
+        let scaled: Vec<usize> = (0..n).filter(|&j| active[j] && scales[j] != 1.0).collect();
+        if scaled.is_empty() {
+            break;
+        }
+        if one && n > 1 {
+            // All together: each joint has its say as it is sure of it.
+            let (sum, weight) = scaled.iter().fold((0.0, 0.0), |(sum, weight), &j| {
+                let sure = weighed.gain_error[j].max(1e-3).powi(-2);
+                (sum + sure * weighed.gain[j].max(0.2).ln(), weight + sure)
+            });
+            scaled.iter().for_each(|&j| scales[j] *= (sum / weight).exp());
+        } else {
+            scaled.iter().for_each(|&j| scales[j] *= weighed.gain[j].clamp(0.3, 3.0));
+        }
+        weighed = weigh(model, sample, &scales, active, Freedom::ORDINARY);
+    }
+    (scales, weighed)
+}
+
+/// Units of torque (force), each with its size: logged = factor × true.
+pub(crate) fn effort_unit(scale: f64, error: f64, limit: Option<f64>) -> Option<(String, f64)> {
+    const UNITS: [(&str, f64); 7] = [
+        ("N mm or mN m", 1e3),
+        ("N cm", 1e2),
+        ("oz in", 141.612),
+        ("kgf cm", 10.1972),
+        ("lb in", 8.85075),
+        ("kN m", 1e-3),
+        ("kgf m", 0.101972),
+    ];
+    // All bodies together may be off by some per cent, which no log tells from a factor.
+    let near = |factor: f64| (scale.abs() / factor).ln().abs() < (2.5 * error).clamp(0.06, 0.08);
+    let mut fitting: Vec<(String, f64)> =
+        UNITS.iter().filter(|(_, factor)| near(*factor)).map(|(name, factor)| ((*name).to_owned(), *factor)).collect();
+    if let Some(limit) = limit.filter(|limit| *limit > 0.0 && near(100.0 / limit)) {
+        fitting.push(("per cent of the URDF's limit".to_owned(), 100.0 / limit));
+    }
+    // Of two that fit, neither is known.
+    let [one] = fitting.as_slice() else { return None };
+    Some(one.clone())
+}

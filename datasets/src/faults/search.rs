@@ -1,0 +1,373 @@
+//! The order of the search: channels by themselves, then the motion, then the effort, then time between them.
+
+use super::change::Change;
+use super::decide::{Decision, SURE, left};
+use super::effort::{self, Useless};
+use super::sample::Sample;
+use super::shift::Bar;
+use super::weigh::{Freedom, Weighed, weigh};
+use super::words::per_cent;
+use super::{Doubt, Fault, FaultKind, Faults, channels, figure, odd};
+use crate::check::{Logs, Seen};
+use crate::episode::Episode;
+use crate::robust::rms;
+use gapscope_dynamics::Model;
+
+/// Shifts below this are an effect, s: the border is 20 ms, and a lag of that looks like one a little longer.
+const SHIFT: f64 = 0.022;
+/// Logs that leave more than this of the effort, squared, even of a robot that was described badly, may be another's.
+const STRANGE: f64 = 0.5;
+/// Logs whose effort is, in the mean, more than this times the limit of the drive may be in another unit.
+const STRONG: f64 = 2.0;
+/// What the model says is wrong is beyond doubt where the mended logs leave less than this of the effort, squared.
+const SETTLED: f64 = 0.1;
+/// A robot whose mass is outside of these parts of the described one may be another, or be logged in other units: its links are
+/// off by a third at most, and it carries no more than that.
+const MASS: (f64, f64) = (0.62, 1.6);
+/// At most so many things are wrong with the motion.
+const ROUNDS: usize = 6;
+/// The logs while faults are taken out of them.
+struct Search {
+    model: Model,
+    episodes: Vec<Episode>,
+    faults: Vec<Fault>,
+    doubts: Vec<Doubt>,
+    /// Whether one log speaks for itself alone: it must be clearer then.
+    alone: bool,
+    /// What was seen of the logs as they now are.
+    seen: Option<Seen>,
+}
+
+/// Faults of logs. All are taken to have the same ones, but for one that is not like the others.
+pub(crate) fn search(model: &Model, episodes: &[&Episode]) -> Faults {
+    let n = model.dof();
+    let fits =
+        |episode: &&&Episode| n > 0 && episode.len() >= 40 && episode.position.len() == n && episode.effort.len() == n;
+    let episodes: Vec<Episode> = episodes.iter().filter(fits).map(|episode| (*episode).clone()).collect();
+    if episodes.is_empty() {
+        return Faults::default();
+    }
+    let mut search =
+        Search { model: model.clone(), episodes, faults: Vec::new(), doubts: Vec::new(), alone: false, seen: None };
+    search.channels();
+    let (sample, active) = search.sampled();
+    for odd in odd::odd_ones(model, &sample, &active) {
+        if let Some(found) = search.apart(odd, &sample, &active) {
+            return found;
+        }
+    }
+    search.dynamics();
+    Faults { faults: search.faults, doubts: search.doubts }
+}
+
+impl Search {
+    /// What the model says of the logs.
+    fn dynamics(&mut self) {
+        let (before, logged) = (self.faults.len(), (self.model.clone(), self.episodes.clone()));
+        // A shift bends whatever account of the motion there is: one that explains all goes first.
+        self.shift(true);
+        self.motion();
+        self.effort();
+        self.shift(false);
+        if self.faults.len() > before && self.badly_described().is_some_and(|left| left.1 > SETTLED) {
+            (self.model, self.episodes) = logged;
+            self.seen = None;
+            let asked = self.faults.drain(before..).map(|fault| Doubt {
+                question: format!("{}?", fault.evidence),
+                joints: fault.joints,
+                effects: Vec::new(),
+            });
+            self.doubts.extend(asked);
+        }
+        self.stranger();
+        let velocities = self.with_logs(channels::velocities);
+        velocities.into_iter().for_each(|fault| self.take(fault));
+    }
+
+    /// What is wrong with one log and what with the others, where that makes it one of them.
+    fn apart(&self, odd: usize, sample: &Sample, active: &[bool]) -> Option<Faults> {
+        let part = |episodes: Vec<Episode>, alone: bool| {
+            let model = self.model.clone();
+            let mut part = Search { model, episodes, faults: Vec::new(), doubts: Vec::new(), alone, seen: None };
+            part.dynamics();
+            part
+        };
+        let own = part(vec![self.episodes[odd].clone()], true);
+        let of_robot = |fault: &Fault| fault.gravity.is_some();
+        if own.faults.is_empty() || own.faults.iter().any(of_robot) {
+            return None;
+        }
+        let mut others = self.episodes.clone();
+        others.remove(odd);
+        let mut rest = part(others, false);
+        // What the others have as well makes no log odd: all are searched together.
+        let shared = |fault: &Fault| rest.faults.iter().any(|o| (o.kind, &o.joints) == (fault.kind, &fault.joints));
+        if own.faults.iter().all(shared) {
+            return None;
+        }
+        // All logs as both leave them.
+        let mut mended = rest.episodes.clone();
+        mended.insert(odd, own.episodes[0].clone());
+        let after = sampled(&rest.model, &mended);
+        if !odd::is_like_the_others(&rest.model, sample, &after, odd, active) {
+            return None;
+        }
+        let names: Vec<String> = self.episodes.iter().map(|episode| episode.name.clone()).collect();
+        let of_others = || names.iter().enumerate().filter(|(e, _)| *e != odd).map(|(_, name)| name.clone()).collect();
+        rest.faults.iter_mut().filter(|fault| fault.files.is_empty()).for_each(|fault| fault.files = of_others());
+        let of_odd = own.faults.into_iter().map(|fault| Fault { files: vec![names[odd].clone()], ..fault });
+        let faults = self.faults.iter().cloned().chain(rest.faults).chain(of_odd).collect();
+        Some(Faults { faults, doubts: rest.doubts })
+    }
+
+    fn sampled(&mut self) -> (Sample, Vec<bool>) {
+        self.with_logs(|logs| (Sample::new(logs), Self::active(logs)))
+    }
+
+    fn with_logs<T>(&mut self, f: impl FnOnce(&Logs) -> T) -> T {
+        let episodes: Vec<&Episode> = self.episodes.iter().collect();
+        let logs = match self.seen.take() {
+            Some(seen) => Logs::again(&self.model, &episodes, seen),
+            None => Logs::new(&self.model, &episodes),
+        };
+        let found = f(&logs);
+        self.seen = Some(logs.seen());
+        found
+    }
+
+    /// Undoes a fault in the logs that the search goes on with.
+    fn take(&mut self, fault: Fault) {
+        for episode in self.episodes.iter_mut().filter(|episode| fault.concerns(&episode.name)) {
+            fault.changes.iter().for_each(|change| change.apply(episode));
+        }
+        self.seen = None;
+        if let Some(gravity) = fault.gravity {
+            self.model = self.model.clone().with_gravity(gravity.into());
+        }
+        self.faults.push(fault);
+    }
+
+    /// Channels by themselves.
+    fn channels(&mut self) {
+        let mut found = self.with_logs(|logs| {
+            let mut found = Vec::new();
+            let all: Vec<usize> = (0..logs.episodes.len()).collect();
+            for &e in &all {
+                for (j, turn) in channels::wrapped(logs, e) {
+                    let evidence = format!("the angle jumps by a whole turn, {} times", logs.traits[e][j].wraps.len());
+                    found.push(Fault::new(
+                        logs,
+                        FaultKind::PositionWrapped,
+                        &[j],
+                        &[e],
+                        None,
+                        evidence,
+                        vec![Change::Unwrap(j, turn)],
+                    ));
+                }
+                if let Some((kept, times)) = channels::readings(logs, e) {
+                    let evidence = format!(
+                        "the positions hold for {} samples and then jump: readings come at {} Hz",
+                        figure(times),
+                        figure(1.0 / (logs.dt[e] * times))
+                    );
+                    found.push(Fault::new(
+                        logs,
+                        FaultKind::RepeatedSamples,
+                        &[],
+                        &[e],
+                        Some(times),
+                        evidence,
+                        vec![Change::Readings(kept)],
+                    ));
+                }
+                let same = channels::set_points(logs, e);
+                if !same.is_empty() {
+                    let evidence =
+                        "position and command are equal to the last digit: the set point was logged twice".to_owned();
+                    let changes = same.iter().map(|&j| Change::NoEffort(j)).collect();
+                    found.push(Fault::new(logs, FaultKind::PositionIsCommand, &same, &[e], None, evidence, changes));
+                }
+            }
+            let sample = Sample::new(logs);
+            let torque = sample.torque(logs.model);
+            for &e in &all {
+                let useless = effort::useless_joints(logs, e, &torque);
+                for (j, useless) in useless {
+                    let (kind, evidence) = match useless {
+                        // A joint that nothing drives has a known effort, none.
+                        Useless::Constant(0.0) if effort::is_passive(logs.model, &sample, j) => continue,
+                        Useless::Constant(value) => (
+                            FaultKind::EffortMissing,
+                            format!("the effort is {} throughout, though the joint moves", figure(value)),
+                        ),
+                        Useless::Noise => (
+                            FaultKind::EffortNoise,
+                            "the effort changes from sample to sample and follows neither motion nor model".to_owned(),
+                        ),
+                    };
+                    found.push(Fault::new(logs, kind, &[j], &[e], None, evidence, vec![Change::NoEffort(j)]));
+                }
+            }
+            let useless = |j: &usize| found.iter().any(|fault| fault.changes.contains(&Change::NoEffort(*j)));
+            let others: Vec<usize> = (0..logs.model.dof()).filter(|j| !useless(j)).collect();
+            for j in effort::absolute_joints(logs, &sample, &torque, &others) {
+                let evidence =
+                    "the effort never changes its sign, though the model's torque does, and is like it in size"
+                        .to_owned();
+                let changes = vec![Change::NoEffort(j)];
+                found.push(Fault::new(logs, FaultKind::EffortAbsolute, &[j], &all, None, evidence, changes));
+            }
+            found
+        });
+        merge(&mut found, self.episodes.len());
+        found.into_iter().for_each(|fault| self.take(fault));
+    }
+
+    /// Joints whose effort says something.
+    fn active(logs: &Logs) -> Vec<bool> {
+        (0..logs.model.dof())
+            .map(|j| {
+                let known = !logs.episodes.iter().any(|episode| episode.effort_unknown.contains(&j));
+                let changes = logs.episodes.iter().any(|e| e.effort[j].windows(2).any(|pair| pair[0] != pair[1]));
+                known && changes && logs.traits.iter().any(|traits| traits[j].moves())
+            })
+            .collect()
+    }
+
+    /// Units, signs, zeros and order of positions, the clock, gravity: the likeliest account first, as long as one is
+    /// needed.
+    fn motion(&mut self) {
+        let alone = self.alone;
+        for _ in 0..ROUNDS {
+            let step = self.with_logs(|logs| {
+                let active = Self::active(logs);
+                let sample = Sample::new(logs);
+                if sample.len() < 30 || !active.contains(&true) {
+                    return None;
+                }
+                Decision { model: logs.model, alone }.next(logs, &sample, &active)
+            });
+            match step {
+                Some(Ok(fault)) => self.take(fault),
+                Some(Err(doubt)) => {
+                    self.doubts.push(doubt);
+                    return;
+                }
+                None => return,
+            }
+        }
+    }
+
+    /// Unit and sign of the effort.
+    fn effort(&mut self) {
+        let alone = self.alone;
+        let found = self.with_logs(|logs| {
+            let active = Self::active(logs);
+            let sample = Sample::new(logs);
+            if sample.len() < 30 || !active.contains(&true) {
+                return Vec::new();
+            }
+            super::scale::scales(logs, logs.model, &sample, &active, alone)
+        });
+        for found in found {
+            match found {
+                Ok(fault) => self.take(fault),
+                Err(doubt) => self.doubts.push(doubt),
+            }
+        }
+    }
+
+    /// Logs that no account explains are asked for their robot.
+    fn stranger(&mut self) {
+        if self.alone || !(self.faults.is_empty() && self.doubts.is_empty()) {
+            return;
+        }
+        let Some((weighed, left)) = self.badly_described() else { return };
+        let mass = weighed.mass;
+        let strong = self.with_logs(strong);
+        let question = if left > STRANGE {
+            format!(
+                "are these the logs of this robot? Whatever its bodies and friction, {} of the effort, squared, is left",
+                per_cent(left)
+            )
+        } else if !(MASS.0..MASS.1).contains(&mass) {
+            format!(
+                "are effort, position and time in N m (N), rad (m) and s? They ask for a robot of {} times the mass that the description has",
+                figure(mass)
+            )
+        } else if let Some((j, times)) = strong {
+            let joint = &self.model.joints()[j].name;
+            format!("is the effort of {joint} in N m (N)? It is {} times the limit of its drive", figure(times))
+        } else {
+            return;
+        };
+        self.doubts.push(Doubt { question, joints: Vec::new(), effects: Vec::new() });
+    }
+
+    /// The logs as they now are, held against a robot that was described badly, and what that leaves of the effort.
+    fn badly_described(&mut self) -> Option<(Weighed, f64)> {
+        self.with_logs(|logs| {
+            let (active, sample) = (Self::active(logs), Sample::new(logs));
+            if sample.len() < 30 || !active.contains(&true) {
+                return None;
+            }
+            let weighed = weigh(logs.model, &sample, &vec![1.0; active.len()], &active, Freedom::WIDE);
+            let left = left(&weighed, &active);
+            Some((weighed, left))
+        })
+    }
+
+    /// Effort and position of different instants.
+    fn shift(&mut self, nothing_else: bool) {
+        let alone = self.alone;
+        let bar = Bar { least: SHIFT, sure: if alone { 2.0 * SURE } else { SURE }, nothing_else };
+        let found = self.with_logs(|logs| {
+            let active = Self::active(logs);
+            let sample = Sample::new(logs);
+            if sample.len() < 30 || !active.contains(&true) {
+                return None;
+            }
+            super::shift::shift(logs, logs.model, &sample, &active, bar)
+        });
+        if let Some(fault) = found {
+            self.take(fault);
+        }
+    }
+}
+
+/// The joint whose effort passes the limit of its drive most, and how many times, where no drive does that.
+fn strong(logs: &Logs) -> Option<(usize, f64)> {
+    let times = |(j, joint): (usize, &gapscope_dynamics::Joint)| {
+        let limit = joint.limits.effort.filter(|limit| *limit > 0.0)?;
+        let most = logs.episodes.iter().map(|episode| rms(&episode.effort[j])).fold(0.0, f64::max);
+        Some((j, most / limit))
+    };
+    let all = logs.model.joints().iter().enumerate().filter_map(times);
+    all.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, times)| *times > STRONG)
+}
+
+/// A sample of logs.
+fn sampled(model: &Model, episodes: &[Episode]) -> Sample {
+    Sample::new(&Logs::new(model, &episodes.iter().collect::<Vec<_>>()))
+}
+
+/// Faults that are the same but for the log become one, said of all where it is of all.
+fn merge(found: &mut Vec<Fault>, logs: usize) {
+    let mut merged: Vec<Fault> = Vec::new();
+    for fault in found.drain(..) {
+        let same = |other: &&mut Fault| {
+            other.kind == fault.kind && other.joints == fault.joints && other.changes == fault.changes
+        };
+        match merged.iter_mut().find(same) {
+            Some(other) => {
+                other.files.extend(fault.files);
+                if other.files.len() >= logs {
+                    other.files.clear();
+                }
+            }
+            None => merged.push(fault),
+        }
+    }
+    *found = merged;
+}

@@ -1,0 +1,118 @@
+//! The size of an account that is taken, at its greatest likelihood.
+
+use super::change::Change;
+use super::decide::Decision;
+use super::motion::{self, Account, Kind};
+use super::sample::Sample;
+use super::weigh::{Freedom, weigh};
+use crate::check::Logs;
+use gapscope_dynamics::JointKind;
+use glam::DVec3;
+use std::f64::consts::FRAC_PI_2;
+
+/// By how many nats a unit with a name, or a right angle, may fit worse than what lies beside it: bodies that are off by a
+/// few per cent move a factor by as much.
+const NAMED: f64 = 12.0;
+
+/// Factors that are tried on either side of one that limits alone tell, and from one to the next: up to thirty times.
+const ROUGH: i32 = 23;
+const STEP: f64 = 1.16;
+/// Places at which they are tried.
+const FEW: usize = 100;
+
+impl Decision<'_> {
+    /// An account whose factor or zero is brought to where its likelihood is greatest; what has a name stays.
+    pub fn sharpened(&self, logs: &Logs, sample: &Sample, active: &[bool], account: Account) -> Account {
+        if let (Kind::Gravity, Some(gravity)) = (account.kind, account.gravity) {
+            let own = self.model.gravity();
+            let at = |gravity: DVec3| {
+                let (weighed, extra) = self.weighed(&self.model.clone().with_gravity(gravity), sample, active);
+                (weighed.score - extra, gravity)
+            };
+            // The earth's gravity in another direction, the opposite one first, before another gravity.
+            let turned = at(gravity.normalize() * own.length());
+            let around = [at(gravity), turned, at(-own)];
+            let most = around.iter().map(|(score, _)| *score).fold(f64::NEG_INFINITY, f64::max);
+            let found = around.into_iter().rev().find(|(score, _)| *score > most - 4.0).map_or(gravity, |(_, g)| g);
+            return Account { gravity: Some(found), value: found.length() / own.length(), ..account };
+        }
+        let add = match account.kind {
+            Kind::Zero => true,
+            Kind::Scale | Kind::Clock => false,
+            _ => return account,
+        };
+        let at = |value: f64| {
+            let mut other = Account { value, ..account.clone() };
+            for change in &mut other.changes {
+                match change {
+                    Change::Clock(factor) => *factor = 1.0 / value,
+                    Change::Position(_, _, offset) if add => *offset = -value,
+                    Change::Position(_, factor, _) => *factor = 1.0 / value,
+                    _ => {}
+                }
+            }
+            let mut changed = sample.clone();
+            other.changes.iter().for_each(|change| motion::apply(change, &mut changed));
+            let (weighed, extra) = self.weighed(self.model, &changed, active);
+            (weighed.score - extra, other)
+        };
+        let mut best = at(account.value);
+        if account.inside > 0 {
+            // Limits tell that there is a factor, and hardly its size: the size that asks least of the efforts, at few places.
+            let few = sample.thinned(sample.len().div_ceil(FEW).max(1));
+            let ones = vec![1.0; active.len()];
+            let rough = |i: i32| {
+                let value = account.value * STEP.powi(i);
+                let mut changed = few.clone();
+                let change = |j: &usize| motion::apply(&Change::Position(*j, 1.0 / value, 0.0), &mut changed);
+                account.joints.iter().for_each(change);
+                (weigh(self.model, &changed, &ones, active, Freedom::ORDINARY).score, value)
+            };
+            let likeliest = (-ROUGH..=ROUGH).map(rough).max_by(|a, b| a.0.total_cmp(&b.0));
+            let other = likeliest.map(|(_, value)| at(value)).filter(|other| other.0 > best.0);
+            best = other.unwrap_or(best);
+        }
+        let mut step = 0.04;
+        for _ in 0..9 {
+            let moved = |step: f64| if add { best.1.value + step } else { best.1.value * (1.0 + step) };
+            let around = [at(moved(step)), at(moved(-step))];
+            match around.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some(better) if better.0 > best.0 + 1e-6 => best = better,
+                _ => step *= 0.4,
+            }
+        }
+        // A right angle is a right angle, and a unit that has a name is that unit; a measured velocity tells a factor better
+        // than bodies that are not known well.
+        let mut near: Vec<f64> = Vec::new();
+        if add {
+            near.push((best.1.value / FRAC_PI_2).round() * FRAC_PI_2);
+        } else if account.kind == Kind::Scale {
+            let prismatic = self.model.joints()[account.joints[0]].kind == JointKind::Prismatic;
+            near.extend(motion::position_units(prismatic).iter().map(|(_, factor)| *factor));
+        } else {
+            near.extend(motion::CLOCKS.iter().map(|(_, factor)| *factor));
+        }
+        let reach = match account.kind {
+            Kind::Zero => 0.12,
+            Kind::Clock => 0.15,
+            _ if account.inside > 0 => STEP.powi(2).ln(),
+            _ => 0.05,
+        };
+        let off = |value: f64| if add { (value - best.1.value).abs() } else { (value / best.1.value).ln().abs() };
+        let named = near.into_iter().filter(|value| *value != 0.0 && off(*value) < reach).map(&at);
+        if let Some(named) = named.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|named| named.0 > best.0 - NAMED) {
+            return named.1;
+        }
+        let measured = match account.kind {
+            Kind::Clock => motion::velocity_slope(logs),
+            Kind::Scale => slope_of(logs, account.joints[0]).map(f64::recip),
+            _ => None,
+        };
+        measured.filter(|value| *value > 0.0 && off(*value) < reach).map_or(best.1, |value| at(value).1)
+    }
+}
+
+/// Speed measured over speed derived of one joint, in the first log that tells.
+fn slope_of(logs: &Logs, j: usize) -> Option<f64> {
+    logs.relations.iter().find_map(|relations| relations[j]).filter(|one| one.correlation > 0.95).map(|one| one.slope)
+}

@@ -1,0 +1,251 @@
+//! How well an account of the logs holds: the torque of the model, with the freedom that an ordinary robot has, against
+//! the effort. Two accounts of the same logs are compared by the difference of their scores, a log-likelihood ratio.
+
+use super::sample::Sample;
+use crate::robust::rms;
+use gapscope_dynamics::{Data, Model};
+use nalgebra::{DMatrix, DVector};
+
+/// What lies below this share of the effort's variance is no evidence: no robot is known that well.
+const FLOOR: f64 = 3e-4;
+/// Places count as so many independent ones at most, a joint.
+const MOST_INDEPENDENT: f64 = 120.0;
+/// What it costs, in nats, to take a robot for one that has been used long.
+const WORN: f64 = 3.0;
+/// Rounds of weighing the joints against each other.
+const ROUNDS: usize = 4;
+/// Columns of each joint: bias, viscous and dry friction, rotor, gain.
+pub(crate) const OWN: usize = 5;
+
+/// How far a robot may be from its description before an account loses by it: standard deviations.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Freedom {
+    /// Of masses, relative; first moments and inertia follow.
+    pub bodies: f64,
+    /// Of the gain of each drive, relative.
+    pub gain: f64,
+    /// What lies below this share of the effort's variance is no evidence.
+    pub floor: f64,
+}
+
+impl Freedom {
+    /// A used robot.
+    pub const ORDINARY: Freedom = Freedom { bodies: 0.07, gain: 0.07, floor: FLOOR };
+    /// The same, to tell a size once it is known that there is one: the least bit counts.
+    pub const FINE: Freedom = Freedom { floor: 1e-6, ..Freedom::ORDINARY };
+    /// One whose links are off by up to a third.
+    pub const WORN: Freedom = Freedom { bodies: 0.2, gain: 0.1, floor: FLOOR };
+    /// One that was described badly.
+    pub const WIDE: Freedom = Freedom { bodies: 0.4, gain: 0.1, floor: FLOOR };
+}
+
+/// An account, weighed.
+#[derive(Debug, Clone)]
+pub(crate) struct Weighed {
+    /// Logarithm of its likelihood and of what it asks of the robot, up to a constant that all accounts share.
+    pub score: f64,
+    /// What it asks of the robot, in nats.
+    pub asked: f64,
+    /// Share of each joint's effort, squared, that it leaves.
+    pub unexplained: Vec<f64>,
+    /// Further factor of each joint's effort, 1 where the account has it right.
+    pub gain: Vec<f64>,
+    /// Its standard error.
+    pub gain_error: Vec<f64>,
+    /// Standard deviation of every column of the fit over that before it: of the links' parameters, then of what [`OWN`] says.
+    pub narrowed: Vec<f64>,
+    /// Mass that the effort asks the robot to have, over that of its description; gains of the drives are in it.
+    pub mass: f64,
+    /// What it makes of the effort, joint-major, N m or N.
+    pub predicted: Vec<Vec<f64>>,
+}
+
+impl Weighed {
+    /// Whether nothing is left to ask: little of any effort, and of an ordinary robot.
+    pub fn is_plain(&self, active: &[bool]) -> bool {
+        let joints = active.iter().filter(|active| **active).count() as f64;
+        let little = self.unexplained.iter().zip(active).all(|(left, active)| !active || *left < 0.03);
+        little && self.asked < 4.0 + 2.0 * joints
+    }
+}
+
+/// Weighs an account by the likelier of two robots: a used one, and one that has been used long.
+pub(crate) fn weigh_either(model: &Model, sample: &Sample, scale: &[f64], active: &[bool]) -> Weighed {
+    let ordinary = weigh(model, sample, scale, active, Freedom::ORDINARY);
+    if ordinary.is_plain(active) {
+        return ordinary;
+    }
+    let mut worn = weigh(model, sample, scale, active, Freedom::WORN);
+    worn.score -= WORN;
+    if worn.score > ordinary.score { worn } else { ordinary }
+}
+
+/// Weighs an account: `scale[j]` is what the effort of joint j was multiplied by when it was logged. Joints that are not
+/// `active` have no say.
+pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[bool], freedom: Freedom) -> Weighed {
+    let n = model.dof();
+    let places = sample.len();
+    let width = 10 * n + OWN * n;
+    let torque = sample.torque(model);
+    let target: Vec<Vec<f64>> =
+        (0..n).map(|j| sample.effort[j].iter().map(|effort| effort / scale[j]).collect()).collect();
+    let most = torque.iter().map(|row| rms(row)).fold(0.0, f64::max);
+    let level: Vec<f64> = (0..n).map(|j| level(model, j, &torque[j], most)).collect();
+    let slow: Vec<f64> = sample.v.iter().map(|v| 0.1 * rms(v)).collect();
+    let columns = |j: usize, k: usize, row: &mut [f64]| {
+        let v = sample.v[j][k];
+        let dry = if slow[j] > 0.0 { (v / slow[j]).tanh() } else { 0.0 };
+        row[10 * n + OWN * j..][..OWN].copy_from_slice(&[1.0, v, dry, sample.a[j][k], torque[j][k]]);
+    };
+    // Normal equations joint by joint, so that the joints can be weighed against each other afterwards.
+    let mut normal = vec![DMatrix::<f64>::zeros(width, width); n];
+    let mut right = vec![DVector::<f64>::zeros(width); n];
+    let mut squares = vec![0.0; n];
+    let mut bodies = DMatrix::zeros(n, 10 * n);
+    let mut data = Data::new(model);
+    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut rows = vec![vec![0.0; width * places]; n];
+    for k in 0..places {
+        for j in 0..n {
+            (q[j], v[j], a[j]) = (sample.q[j][k], sample.v[j][k], sample.a[j][k]);
+        }
+        model.regressor(&mut data, &q, &v, &a, &mut bodies);
+        for j in (0..n).filter(|&j| active[j]) {
+            let row = &mut rows[j][width * k..][..width];
+            row[..10 * n].iter_mut().enumerate().for_each(|(i, x)| *x = bodies[(j, i)]);
+            columns(j, k, row);
+        }
+    }
+    for j in (0..n).filter(|&j| active[j]) {
+        let table = DMatrix::from_column_slice(width, places, &rows[j]);
+        let left = DVector::from_iterator(places, target[j].iter().zip(&torque[j]).map(|(y, tau)| y - tau));
+        normal[j] = &table * table.transpose();
+        right[j] = &table * &left;
+        squares[j] = left.norm_squared();
+    }
+    let mut prior = prior(model, sample, &level, freedom);
+    let ordinary = prior.clone();
+    let variance: Vec<f64> = target.iter().map(|y| spread(y)).collect();
+    let independent = (0.5 * places as f64).min(MOST_INDEPENDENT);
+    // Rows count as fewer where they are not independent.
+    let worth = independent / places.max(1) as f64;
+    let mut noise: Vec<f64> = variance.iter().map(|v| (0.1 * v).max(1e-300)).collect();
+    let mut solution = DVector::zeros(width);
+    let mut last = None;
+    let mut unexplained = vec![1.0; n];
+    for _ in 0..ROUNDS {
+        let mut sum = DMatrix::from_diagonal(&DVector::from_iterator(width, prior.iter().map(|s| s.powi(-2))));
+        let mut b = DVector::zeros(width);
+        for j in (0..n).filter(|&j| active[j]) {
+            sum += &normal[j] * (worth / noise[j]);
+            b += &right[j] * (worth / noise[j]);
+        }
+        // Scaled by the prior the matrix is at least the identity.
+        let size = DVector::from_vec(prior.clone());
+        for (mut column, s) in sum.column_iter_mut().zip(&size) {
+            column.component_mul_assign(&size);
+            column *= *s;
+        }
+        let Some(factor) = sum.cholesky() else { break };
+        solution = factor.solve(&b.component_mul(&size)).component_mul(&size);
+        last = Some(factor);
+        keep_to_physics(model, &solution, &ordinary, &mut prior, freedom);
+        for j in (0..n).filter(|&j| active[j]) {
+            let left = squares[j] - 2.0 * solution.dot(&right[j]) + solution.dot(&(&normal[j] * &solution));
+            let share = left.max(0.0) / places.max(1) as f64 / variance[j].max(1e-300);
+            unexplained[j] = if share.is_finite() { share.max(freedom.floor) } else { 1e3 };
+            noise[j] = unexplained[j] * variance[j].max(1e-300);
+        }
+    }
+    let inverse = last.map_or_else(|| DMatrix::zeros(0, 0), |factor| factor.inverse());
+    let asked: f64 = solution.iter().zip(&prior).map(|(x, s)| 0.5 * (x / s).powi(2)).sum();
+    let likelihood: f64 = (0..n).filter(|&j| active[j]).map(|j| -0.5 * independent * unexplained[j].ln()).sum();
+    let gain_at = |j: usize| 10 * n + OWN * j + 4;
+    let error = |j: usize| inverse.get((gain_at(j), gain_at(j))).map_or(1.0, |x| x.max(0.0).sqrt() * freedom.gain);
+    let predicted = (0..n).map(|j| {
+        let at = |k: usize| {
+            let row = &rows[j][width * k..][..width];
+            torque[j][k] + row.iter().zip(solution.iter()).map(|(x, p)| x * p).sum::<f64>()
+        };
+        (0..places).map(at).collect()
+    });
+    let described: f64 = model.joints().iter().map(|joint| joint.inertia.mass.abs()).sum();
+    let further: f64 = (0..n).map(|j| solution[10 * j]).sum();
+    let gains: Vec<f64> = (0..n).filter(|&j| active[j]).map(|j| 1.0 + solution[gain_at(j)]).collect();
+    let mean_gain = gains.iter().sum::<f64>() / gains.len().max(1) as f64;
+    Weighed {
+        score: likelihood - asked,
+        mass: (1.0 + further / described.max(1e-9)) * mean_gain,
+        asked,
+        unexplained,
+        gain: (0..n).map(|j| 1.0 + solution[gain_at(j)]).collect(),
+        gain_error: (0..n).map(error).collect(),
+        narrowed: (0..width).map(|i| inverse.get((i, i)).map_or(1.0, |x| x.max(0.0).sqrt())).collect(),
+        predicted: predicted.collect(),
+    }
+}
+
+/// Friction and rotors take torque, they give none, and what hangs on the last link has a mass: where a solution says
+/// otherwise, that column gets no more freedom than an error of the description has.
+fn keep_to_physics(model: &Model, solution: &DVector<f64>, ordinary: &[f64], prior: &mut [f64], freedom: Freedom) {
+    let n = model.dof();
+    for j in 0..n {
+        for i in 10 * n + OWN * j + 1..10 * n + OWN * j + 4 {
+            if solution[i] < 0.0 {
+                prior[i] = 0.1 * ordinary[i];
+            }
+        }
+        let mass = freedom.bodies * model.joints()[j].inertia.mass.abs();
+        if solution[10 * j] < 0.0 && mass > 0.0 && mass < ordinary[10 * j] {
+            let share = mass / ordinary[10 * j];
+            (10 * j..10 * j + 10).for_each(|i| prior[i] = share * ordinary[i]);
+        }
+    }
+}
+
+/// What is much torque for a joint: its limit, or the torque that the motion takes. `most` is what it takes of the joint that
+/// bears most.
+fn level(model: &Model, j: usize, torque: &[f64], most: f64) -> f64 {
+    let limit = model.joints()[j].limits.effort.filter(|limit| *limit > 0.0 && limit.is_finite()).unwrap_or(0.0);
+    // A limit far beyond what the motion takes is that of another drive, or none. A wrist that bears next to nothing has the
+    // friction of its drive all the same.
+    let taken = rms(torque);
+    limit.min((300.0 * taken).max(most)).max(2.0 * taken).max(1e-9)
+}
+
+/// Standard deviations of all columns.
+fn prior(model: &Model, sample: &Sample, level: &[f64], freedom: Freedom) -> Vec<f64> {
+    let n = model.dof();
+    let total: f64 = model.joints().iter().map(|joint| joint.inertia.mass.abs()).sum();
+    let mut prior = vec![1e-9; (10 + OWN) * n];
+    for (j, joint) in model.joints().iter().enumerate() {
+        let body = joint.inertia.parameters();
+        let mass = body[0].abs();
+        // Something may be screwed to the last link.
+        let last = !model.joints().iter().any(|other| other.parent == Some(j));
+        let heavier = freedom.bodies * mass + if last { 0.04 * total } else { 0.005 * total };
+        let center = model.joints()[j].inertia.first_moment.length() / mass.max(1e-9);
+        let trace = body[4] + body[6] + body[9];
+        let size = (0.5 * trace.abs() / mass.max(1e-9)).sqrt().max(center).clamp(1e-3, 1e3);
+        prior[10 * j] = heavier.max(1e-9);
+        prior[10 * j + 1..10 * j + 4].fill((heavier * size).max(1e-9));
+        prior[10 * j + 4..10 * j + 10].fill((2.0 * heavier * size * size).max(1e-9));
+        let fastest = rms(&sample.v[j]).max(1e-9);
+        let hardest = rms(&sample.a[j]).max(1e-9);
+        let own = &mut prior[10 * n + OWN * j..][..OWN];
+        own.copy_from_slice(&[
+            0.08 * level[j],
+            0.12 * level[j] / fastest,
+            0.12 * level[j],
+            0.12 * level[j] / hardest,
+            freedom.gain,
+        ]);
+    }
+    prior
+}
+
+/// Variance.
+pub(crate) fn spread(x: &[f64]) -> f64 {
+    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+    x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len().max(1) as f64
+}

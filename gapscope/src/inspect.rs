@@ -1,0 +1,118 @@
+//! `gapscope inspect`: what logs are like, what is wrong with them, and what they determine.
+
+use crate::cli::{Input, Inspect};
+use crate::input::{fault_line, load, options};
+use crate::report::terminal::{column, fill, pad};
+use crate::report::{count, figure, percent, plain};
+use anyhow::{Context, Result};
+use gapscope_datasets::{Doubt, Fault, LogTraits, determined, inspect, joints_of, read_logs};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// What `--json` prints, schema `gapscope.inspection/1`.
+#[derive(Debug, Serialize)]
+struct Inspection {
+    schema: &'static str,
+    logs: Vec<LogTraits>,
+    faults: Vec<Fault>,
+    doubts: Vec<Doubt>,
+    findings: Vec<String>,
+    /// Which parameters the logs determine, by joint; empty without a robot.
+    determined: BTreeMap<String, Vec<&'static str>>,
+}
+
+/// Inspects; returns what to print.
+///
+/// # Errors
+/// Bad input.
+pub fn run(args: &Inspect) -> Result<String> {
+    let inspection = inspected(args)?;
+    Ok(if args.json { serde_json::to_string(&inspection)? } else { text(&inspection) })
+}
+
+fn inspected(args: &Inspect) -> Result<Inspection> {
+    let schema = "gapscope.inspection/1";
+    let input = Input {
+        robot: args.model.clone().unwrap_or_default(),
+        logs: args.logs.clone(),
+        map: args.map.clone(),
+        map_file: args.map_file.clone(),
+        topic: args.topic.clone(),
+        episodes: args.episodes.clone(),
+        lock: args.lock.clone(),
+        ..Input::default()
+    };
+    if args.model.is_none() {
+        let joints = joints_of(args.logs.first().context("no log is given")?)?;
+        let (episodes, notes) = read_logs(&args.logs, &joints, &options(&input)?)?;
+        let findings = notes.iter().map(ToString::to_string).collect();
+        let logs = inspect(&episodes);
+        return Ok(Inspection { schema, logs, faults: vec![], doubts: vec![], findings, determined: BTreeMap::new() });
+    }
+    let loaded = load(&input)?;
+    let names = loaded.model.joints().iter().map(|joint| joint.name.clone());
+    Ok(Inspection {
+        schema,
+        logs: inspect(&loaded.episodes),
+        determined: names.zip(determined(&loaded.model, &loaded.episodes)).collect(),
+        faults: loaded.faults,
+        doubts: loaded.doubts,
+        findings: loaded.findings,
+    })
+}
+
+fn text(inspection: &Inspection) -> String {
+    let mut text = String::new();
+    for fault in &inspection.faults {
+        let _ = writeln!(text, "Fault: {}", fault_line(fault));
+    }
+    for doubt in &inspection.doubts {
+        let _ = writeln!(text, "In doubt: {}", doubt.question);
+    }
+    if inspection.faults.iter().any(|fault| fault.mended) {
+        text.push_str("What follows is of the mended logs.\n");
+    }
+    for log in &inspection.logs {
+        let _ = writeln!(
+            text,
+            "\n{} · {}, {} s at {} Hz, jitter {}, longest step {} s\n  channels: {}",
+            log.name,
+            count(log.samples, "sample"),
+            plain(log.duration),
+            plain(log.rate),
+            percent(log.jitter),
+            figure(log.longest_step),
+            log.channels.join(", ")
+        );
+        let width = column(log.joints.iter().map(|joint| joint.name.as_str()), 28);
+        for joint in &log.joints {
+            let step = joint.step.map_or(String::new(), |step| format!(", encoder step {}", figure(step)));
+            let still = if joint.moves { "" } else { ", stands still" };
+            let glitches = if joint.glitches > 0 { format!(", {} jumps", joint.glitches) } else { String::new() };
+            let _ = writeln!(
+                text,
+                "  {}  position {} to {}, speed {} rms, noise {}{step}{glitches}{still}; effort {} to {}, held {}",
+                pad(&joint.name, width),
+                fill(&figure(joint.position[0]), 7),
+                fill(&figure(joint.position[1]), 7),
+                figure(joint.speed),
+                figure(joint.noise),
+                figure(joint.effort[0]),
+                figure(joint.effort[1]),
+                percent(joint.effort_held)
+            );
+        }
+    }
+    if !inspection.determined.is_empty() {
+        text.push_str("\nDetermined by these logs, beside all else:\n");
+        for (joint, parameters) in &inspection.determined {
+            let parameters = if parameters.is_empty() { "nothing".to_owned() } else { parameters.join(", ") };
+            let _ = writeln!(text, "  {joint}: {}", parameters.replace('_', " "));
+        }
+    }
+    for finding in &inspection.findings {
+        let _ = writeln!(text, "Note: {finding}");
+    }
+    text.chars().map(|c| if c.is_control() && c != '\n' { ' ' } else { c }).collect()
+}

@@ -21,8 +21,19 @@ pub struct Loaded {
 /// # Errors
 /// A file that cannot be read or that breaks a rule; the text names file, place and mend.
 pub fn load(input: &Input) -> Result<Loaded> {
+    load_with(input, options(input)?)
+}
+
+/// As [`load`], of logs that may hold a set point, current or voltage in the place of the effort.
+///
+/// # Errors
+/// As those of [`load`].
+pub fn load_any(input: &Input) -> Result<Loaded> {
+    load_with(input, ReadOptions { without_effort: true, ..options(input)? })
+}
+
+fn load_with(input: &Input, options: ReadOptions) -> Result<Loaded> {
     let description = robot::read(&input.robot, &input.xacro_args)?;
-    let options = options(input)?;
     let mut locked = input.lock.clone();
     let mut said = Vec::new();
     loop {
@@ -60,6 +71,7 @@ fn options(input: &Input) -> Result<ReadOptions> {
         skip_bad_files: input.skip_bad_logs,
         // A hole in a channel that nothing here needs is worth a finding, not the log.
         drop_bad_channels: true,
+        without_effort: false,
     })
 }
 

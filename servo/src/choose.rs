@@ -12,16 +12,19 @@ use crate::prepare::Joint;
 use crate::run::Signal;
 use crate::simulate::{STEP_PART, STEPS, errors, simulate};
 
-/// A kind must lower the error by this share of the perfect servo's, in root mean square: no servo is modelled to better.
-pub const RELEVANT: f64 = 0.015;
+/// A kind must lower the squared error by this share of what is left, and its square root by this share of perfect tracking's
+/// error: no servo is modelled to better, and no integrator is another's to better.
+pub const RELEVANT: [f64; 2] = [0.04, 0.005];
 /// Steps of a fit that only decides whether a kind is worth more.
 const TRIAL: usize = 8;
 /// Steps of a fit that is kept.
 const FULL: usize = 25;
 /// Nats from which on a kind is taken: no law of a servo is exact, and what is left of it speaks for some kind or other.
-const TAKEN: f64 = 5.0;
-/// Kinds that one joint may have at most.
-const MOST: usize = 6;
+const TAKEN: f64 = 4.0;
+/// Kinds that one joint may have at most, before what is needless is dropped.
+const MOST: usize = 9;
+/// Kinds that stand in from the beginning, and are dropped where the logs do not speak for them.
+const USUAL: [Kind; 5] = [Kind::Coulomb, Kind::Viscous, Kind::Load, Kind::Armature, Kind::Bias];
 /// A delay that nobody was told of is claimed from this many samples on: within one, it is the logger's order of reading and
 /// writing.
 const CLAIMED_DELAY: f64 = 1.5;
@@ -184,7 +187,7 @@ impl Choice<'_> {
             let gain = kind.starts().iter().map(|&start| self.promise(best, &project, kind, start)).fold(0.0, f64::max);
             let rest = (best.cost - gain).max(1e-3 * best.cost);
             let nats = 0.5 * samples * (best.cost / rest).ln() - 0.5 * samples.ln() - kind.cost();
-            if nats > 0.0 && gain > RELEVANT * RELEVANT * self.perfect {
+            if nats > 0.0 && gain > self.least(rest) {
                 promises.push((nats, kind));
             } else {
                 why.push(Comparison { proposed: kind, nats, taken: false, last: false });
@@ -224,8 +227,13 @@ impl Choice<'_> {
         0.5 * samples * (poor.cost / rich.cost.max(1e-300)).ln() - 0.5 * more * samples.ln() - kind.cost()
     }
 
+    /// The least fall of the squared error that counts, where `rest` is left.
+    fn least(&self, rest: f64) -> f64 {
+        (RELEVANT[0] * rest).max(RELEVANT[1] * RELEVANT[1] * self.perfect)
+    }
+
     fn relevant(&self, rich: &Fit, poor: &Fit) -> bool {
-        poor.cost - rich.cost > RELEVANT * RELEVANT * self.perfect
+        poor.cost - rich.cost > self.least(rich.cost)
     }
 
     fn measure_perfect(&mut self) {
@@ -263,7 +271,12 @@ pub fn choose(joint: &mut Joint) -> Chosen {
     }
     let possible: Vec<Kind> = Kind::ALL.into_iter().filter(|&kind| is_possible(joint, kind, closed)).collect();
     let mut choice = Choice { joint, base, perfect: 0.0 };
-    let mut kinds: Vec<Kind> = Vec::new();
+    // What most servos have stands in from the beginning: beside each other these show, and each hides behind the rest's lack.
+    let mut kinds: Vec<Kind> = USUAL.into_iter().filter(|kind| possible.contains(kind)).collect();
+    for (param, _, _) in kinds.iter().flat_map(|kind| kind.parameters()) {
+        law[*param] = 0.1 * choice.joint.ranges.scale[*param as usize];
+    }
+    law[Param::Bias] = 0.0;
     let mut why = Vec::new();
     let mut best = choice.fit(&law, &kinds, None, FULL);
     loop {
@@ -293,6 +306,9 @@ pub fn choose(joint: &mut Joint) -> Chosen {
         }
         best = choice.fit(&rich.law, &kinds, None, FULL);
     }
+    weigh(choice.joint, &best.law);
+    choice.measure_perfect();
+    best = choice.fit(&best.law, &kinds, None, FULL);
     let kept = drop_needless(&choice, &mut kinds, &mut best, &mut why);
     let ties = ties(&choice, &kinds, &best, &possible);
     let samples = independent(choice.joint, &best.errors);

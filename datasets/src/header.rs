@@ -453,14 +453,14 @@ mod tests {
 
     #[test]
     fn what_drives_a_joint_stands_in_for_its_effort_where_that_is_asked_for() {
-        let planned =
-            |header: &str, without| plan(&columns(header), &columns("a,b"), &ColumnMap::default(), without);
+        let planned = |header: &str, without| plan(&columns(header), &columns("a,b"), &ColumnMap::default(), without);
         let servo = "time,position.a,position.b,command.a,command.b,voltage.b";
         assert_eq!(planned(servo, false).unwrap_err().kind, LogErrorKind::MissingJoint);
         let plan = planned(servo, true).unwrap();
         assert_eq!(plan.channels, [Channel::Position, Channel::Command, Channel::Voltage]);
         assert_eq!(plan.columnless, [(Channel::Voltage, 0)]);
-        let episode = plan.episode(vec![vec![0.0], vec![1.0], vec![2.0], vec![3.0], vec![4.0], vec![5.0]], &[], &columns("a,b"));
+        let episode =
+            plan.episode(vec![vec![0.0], vec![1.0], vec![2.0], vec![3.0], vec![4.0], vec![5.0]], &[], &columns("a,b"));
         assert!(episode.effort.is_empty() && !episode.has_effort());
         let voltage = episode.voltage.unwrap();
         assert!(voltage[0][0].is_nan() && voltage[1] == [5.0]);

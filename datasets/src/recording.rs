@@ -32,7 +32,8 @@ impl Recording {
         let time_scale = self.name_time(request);
         let mut names: Vec<String> = self.columns.iter().map(|(name, _)| name.trim().to_owned()).collect();
         self.notes.extend(joint_names::matched(&mut names, joints, &request.options.map, true));
-        let plan = plan(&names, joints, &request.options.map, request.options.without_effort).map_err(|error| LogError { row: None, ..error })?;
+        let plan = plan(&names, joints, &request.options.map, request.options.without_effort)
+            .map_err(|error| LogError { row: None, ..error })?;
         self.notes.extend(plan.notes.iter().cloned());
         let count = self.columns[plan.feeds[0].index].1.len();
         let mut numbers = Vec::with_capacity(plan.feeds.len());

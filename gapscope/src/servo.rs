@@ -30,12 +30,7 @@ fn given(file: Option<&Path>, loaded: &Loaded) -> Result<Given> {
 ///
 /// # Errors
 /// A `--drive` file that cannot be read, or results that cannot be written.
-pub fn diagnose(
-    args: &Diagnose,
-    loaded: Loaded,
-    out: &Path,
-    progress: &(dyn Fn(&str, f64) + Sync),
-) -> Result<String> {
+pub fn diagnose(args: &Diagnose, loaded: Loaded, out: &Path, progress: &(dyn Fn(&str, f64) + Sync)) -> Result<String> {
     let given = given(args.drive.as_deref(), &loaded)?;
     let outcome = gapscope_servo::diagnose(&loaded.model, &loaded.episodes, &given, loaded.findings, progress)?;
     output::write(&out.join("diagnosis.json"), &serde_json::to_string_pretty(&outcome.diagnosis)?)?;
@@ -68,8 +63,7 @@ pub fn evaluate(args: &Evaluate, loaded: &Loaded) -> Result<String> {
         }
         None => None,
     };
-    let (evaluation, paths) =
-        gapscope_servo::evaluate(&loaded.model, &loaded.episodes, &given, corrected.as_ref())?;
+    let (evaluation, paths) = gapscope_servo::evaluate(&loaded.model, &loaded.episodes, &given, corrected.as_ref())?;
     if let Some(file) = &args.predictions {
         output::write(file, &table(loaded, &paths))?;
     }
@@ -235,11 +229,16 @@ fn driven(drive: &FoundDrive) -> String {
         format!("{} {}{known}", name.replace('_', " "), estimate(e))
     };
     let cells: Vec<String> = drive.constants.iter().map(cell).collect();
-    if cells.is_empty() { format!("follows its {follows}") } else { format!("follows its {follows}; {}", cells.join("; ")) }
+    if cells.is_empty() {
+        format!("follows its {follows}")
+    } else {
+        format!("follows its {follows}; {}", cells.join("; "))
+    }
 }
 
 fn why(diagnosis: &Diagnosis) -> String {
-    let mut lines = vec![String::new(), "Why      what was proposed, and by how many nats it won (+) or lost (-)".to_owned()];
+    let mut lines =
+        vec![String::new(), "Why      what was proposed, and by how many nats it won (+) or lost (-)".to_owned()];
     for why in &diagnosis.why {
         let word = if why.taken { "taken" } else { "no" };
         lines.push(format!(

@@ -62,7 +62,10 @@ pub fn simulate_arm(model: &Model, laws: &[Option<Law>], joints: &[Joint], log: 
                 factor[j] = row.factor + sigma * mass[(j, j)] / h;
                 (bound[j], delivered[j], load[j]) = (row.bound, row.delivered, row.torque);
                 end[j] = v[j];
-                if laws[j].is_none() && run.on[k] && let Some(target) = &run.target {
+                if laws[j].is_none()
+                    && run.on[k]
+                    && let Some(target) = &run.target
+                {
                     // Perfect tracking: at the next sample the joint stands at the set point of that sample.
                     end[j] = (target.at(k + 1) - q[j]) / (time[k + 1] - t);
                     factor[j] = f64::NAN;

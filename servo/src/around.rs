@@ -83,15 +83,11 @@ mod tests {
 
     #[test]
     fn gravity_is_a_sine_of_the_joints_own_angle() {
-        let model = robots::arm7();
+        let model = Model::from_urdf(robots::arm7()).unwrap().model;
         let n = model.dof();
         let q: Vec<f64> = (0..n).map(|j| 0.3 * j as f64 - 0.7).collect();
         let time = vec![0.0, 0.01, 0.02, 0.03, 0.04];
-        let episode = Episode {
-            time,
-            position: q.iter().map(|&q| vec![q; 5]).collect(),
-            ..Episode::default()
-        };
+        let episode = Episode { time, position: q.iter().map(|&q| vec![q; 5]).collect(), ..Episode::default() };
         let around = surroundings(&model, &episode);
         let mut data = Data::new(&model);
         let mut gravity = vec![0.0; n];

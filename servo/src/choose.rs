@@ -6,6 +6,7 @@
 //! Sources: Schwarz, Ann. Statist. 6(2) 1978; Geyer, Statist. Sci. 7(4) 1992, section 3.3 (initial positive sequence).
 
 use crate::fit::{Fit, fit, normal};
+use crate::interval::Spread;
 use crate::kinds::Kind;
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
@@ -330,8 +331,7 @@ pub fn choose(joint: &mut Joint) -> Chosen {
             found.push((Kind::Delay, nats));
         }
     }
-    let unclaimed =
-        found.iter().map(|f| f.0).filter(|kind| kind.needs_given() && !is_given(joint, *kind)).collect();
+    let unclaimed = found.iter().map(|f| f.0).filter(|kind| kind.needs_given() && !is_given(joint, *kind)).collect();
     Chosen { fit: best, kinds: found, unclaimed, ties, why, samples }
 }
 
@@ -382,7 +382,12 @@ fn drop_needless(
             }
             let poor = choice.fit(&law, &without, None, TRIAL);
             let nats = choice.nats(best, &poor, kind, samples);
-            worth.push((kind, nats, choice.relevant(best, &poor), poor, without));
+            // The bodies of the URDF weigh something for certain: where their weight alone accounts for a constant torque,
+            // and fixes the drive's scale, no bias takes its place.
+            let weightless =
+                kind == Kind::Bias && !Spread::of(best).scale_is_known() && Spread::of(&poor).scale_is_known();
+            let relevant = choice.relevant(best, &poor) && !weightless;
+            worth.push((kind, nats, relevant, poor, without));
         }
         let needless = worth
             .iter()

@@ -48,11 +48,12 @@ pub fn diagnose(
     let mut all = joints(model, episodes, given);
     let excited = all.iter().any(|joint| joint.moved);
     progress("what drives each joint", 0.1);
-    let chosen: Vec<Option<Chosen>> =
-        all.par_iter_mut().map(|joint| joint.moved.then(|| choose(joint))).collect();
-    findings.extend(all.iter().filter(|joint| !joint.moved).map(|joint| {
-        format!("{}: does not move and is not told to; nothing is said of it", joint.name)
-    }));
+    let chosen: Vec<Option<Chosen>> = all.par_iter_mut().map(|joint| joint.moved.then(|| choose(joint))).collect();
+    findings.extend(
+        all.iter()
+            .filter(|joint| !joint.moved)
+            .map(|joint| format!("{}: does not move and is not told to; nothing is said of it", joint.name)),
+    );
     progress("how far the arm's free run is from the logs", 0.8);
     let weights = weights(&all, episodes);
     let law = |j: usize| chosen[j].as_ref().map_or(all[j].start_still(), |c| c.fit.law);
@@ -88,7 +89,9 @@ pub fn diagnose(
         .iter()
         .zip(&laws)
         .zip(chosen.iter().zip(&spreads))
-        .map(|((joint, law), (c, spread))| (joint.name.clone(), drive(joint, law, c.as_ref(), spread.as_ref(), episodes)))
+        .map(|((joint, law), (c, spread))| {
+            (joint.name.clone(), drive(joint, law, c.as_ref(), spread.as_ref(), episodes))
+        })
         .collect();
     let diagnosis = Diagnosis {
         schema: "gapscope.diagnosis/1".to_owned(),
@@ -154,7 +157,9 @@ pub(crate) fn nominal_laws(joints: &[Joint]) -> (Vec<Option<Law>>, bool) {
     let laws: Vec<Option<Law>> = laws
         .into_iter()
         .zip(joints)
-        .map(|(law, joint)| law.or_else(|| joint.runs.iter().all(|run| run.target.is_none()).then(|| joint.start_still())))
+        .map(|(law, joint)| {
+            law.or_else(|| joint.runs.iter().all(|run| run.target.is_none()).then(|| joint.start_still()))
+        })
         .collect();
     let all = joints.iter().all(known);
     (laws, all)
@@ -340,10 +345,9 @@ fn drive(
             }
             let estimate = match param {
                 Param::Scale => Estimate::new(spread.scale(sigma), &format!("N m/{}", joint.signal.unit())),
-                Param::Damping => Estimate::new(
-                    spread.torque(param, law[param], sigma),
-                    &unit_of("N m s/rad", joint.signal, known),
-                ),
+                Param::Damping => {
+                    Estimate::new(spread.torque(param, law[param], sigma), &unit_of("N m s/rad", joint.signal, known))
+                }
                 Param::Limit => Estimate::new(spread.plain(param, law[param]), joint.signal.unit()),
                 Param::Latency => Estimate::new(spread.plain(param, law[param]), "s"),
                 Param::Speed => Estimate::new(spread.plain(param, law[param]), "rad/s"),
@@ -455,7 +459,9 @@ pub fn evaluate(
             regimes: gap::regimes(&before, &all),
             nominal: if known { "given_servo" } else { "perfect_tracking" }.to_owned(),
         },
-        shrink: after.as_ref().map(|after| Shrink { position: gap::change(&refs(&before), &refs(after), &weights, floor) }),
+        shrink: after
+            .as_ref()
+            .map(|after| Shrink { position: gap::change(&refs(&before), &refs(after), &weights, floor) }),
         mean_absolute,
         after: after.as_ref().map(|after| gap::by_joint(after, &all)).unwrap_or_default(),
         logs,

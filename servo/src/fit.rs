@@ -21,6 +21,23 @@ pub struct Ranges {
     pub bounds: [[f64; 2]; PARAMS],
     /// A size of it that would show, by [`Param`].
     pub scale: [f64; PARAMS],
+    /// Given values in torque, by [`Param`], NaN elsewhere: in the law they move with σ unless they are free themselves.
+    pub absolute: [f64; PARAMS],
+}
+
+impl Ranges {
+    /// Puts given torques into a law whose scale has changed.
+    fn tie(&self, law: &mut Law, free: &[Param]) {
+        if !free.contains(&Param::Scale) {
+            return;
+        }
+        for param in Param::ALL {
+            let value = self.absolute[param as usize];
+            if !value.is_nan() && !free.contains(&param) {
+                law[param] = value * law[Param::Scale];
+            }
+        }
+    }
 }
 
 /// A law that was fitted.
@@ -61,6 +78,7 @@ fn sensitivities(law: &Law, free: &[Param], runs: &[Run], ranges: &Ranges, base:
             let step = if value + step > ranges.bounds[i][1] { -step } else { step };
             let mut there = *law;
             there[param] += step;
+            ranges.tie(&mut there, free);
             errors(&there, runs, &mut moved);
             moved.iter().zip(base).map(|(m, b)| (m - b) / step).collect()
         })
@@ -74,6 +92,7 @@ pub fn fit(start: &Law, free: &[Param], runs: &[Run], ranges: &Ranges, most: usi
         let [least, greatest] = ranges.bounds[param as usize];
         law[param] = law[param].clamp(least, greatest);
     }
+    ranges.tie(&mut law, free);
     let mut base = Vec::new();
     errors(&law, runs, &mut base);
     let mut best = squares(&base);
@@ -111,6 +130,7 @@ pub fn fit(start: &Law, free: &[Param], runs: &[Run], ranges: &Ranges, most: usi
                 let [least, greatest] = ranges.bounds[param as usize];
                 there[param] = (law[param] + step[i]).clamp(least, greatest);
             }
+            ranges.tie(&mut there, free);
             let mut out = Vec::new();
             errors(&there, runs, &mut out);
             let cost = squares(&out);

@@ -63,7 +63,9 @@ pub struct Given {
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum GivenError {
     /// Not TOML, or not of this shape.
-    #[error("not a description of drives: {0}; keys are gain, stiffness, damping, torque_constant, resistance, voltage_limit, torque_limit, speed_limit, latency, dead_band, alone or under [joint.NAME] or [log.\"PATTERN\"]")]
+    #[error(
+        "not a description of drives: {0}; keys are gain, stiffness, damping, torque_constant, resistance, voltage_limit, torque_limit, speed_limit, latency, dead_band, alone or under [joint.NAME] or [log.\"PATTERN\"]"
+    )]
     Unreadable(String),
     /// A joint that the robot does not have.
     #[error("[joint.{joint}] names a joint that the robot does not have; its joints are {known}")]
@@ -174,9 +176,11 @@ impl Constants {
         if let Some(Known::Value(s)) = scale {
             if let Some(Known::Value(damping)) = self.damping {
                 joint.fix(Param::Damping, damping / s);
+                joint.ranges.absolute[Param::Damping as usize] = damping;
             }
             if let Some(Known::Value(limit)) = self.torque_limit {
                 joint.fix(Param::Limit, limit / s);
+                joint.ranges.absolute[Param::Limit as usize] = limit;
             }
         }
     }

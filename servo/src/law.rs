@@ -76,7 +76,13 @@ impl Param {
     pub fn is_torque(self) -> bool {
         matches!(
             self,
-            Param::Armature | Param::Damping | Param::Viscous | Param::Coulomb | Param::Rise | Param::Bias | Param::Limit
+            Param::Armature
+                | Param::Damping
+                | Param::Viscous
+                | Param::Coulomb
+                | Param::Rise
+                | Param::Bias
+                | Param::Limit
         )
     }
 }
@@ -166,7 +172,8 @@ impl Law {
     #[inline]
     pub fn row(&self, h: f64, q: f64, v: f64, order: Order, load: f64) -> Row {
         let p = &self.values;
-        let damping = p[Param::Viscous as usize] + if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] };
+        let damping =
+            p[Param::Viscous as usize] + if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] };
         let (mut stiffness, mut w) = match order {
             Order::Off => (0.0, 0.0),
             Order::Deliver(w) => (0.0, w),

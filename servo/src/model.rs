@@ -59,7 +59,9 @@ pub struct ServoModel {
 #[derive(Debug, thiserror::Error)]
 pub enum ServoModelError {
     /// Not JSON, or not of this shape.
-    #[error("not a corrected servo arm ({0}); expected the corrected.json that `gapscope diagnose` writes for logs without torque")]
+    #[error(
+        "not a corrected servo arm ({0}); expected the corrected.json that `gapscope diagnose` writes for logs without torque"
+    )]
     Unreadable(#[from] serde_json::Error),
     /// Another schema.
     #[error("schema is `{0}`, expected `{MODEL_SCHEMA}`; write the file anew with this version's `gapscope diagnose`")]
@@ -73,13 +75,17 @@ pub enum ServoModelError {
         expected: String,
     },
     /// A number that cannot be.
-    #[error("the drive of {joint} has a number that cannot be; `torque_per_unit` and `feedback` are above zero, all others zero or more")]
+    #[error(
+        "the drive of {joint} has a number that cannot be; `torque_per_unit` and `feedback` are above zero, all others zero or more"
+    )]
     Value {
         /// Joint.
         joint: String,
     },
     /// A log that feeds a drive by something else.
-    #[error("the drive of {joint} follows a {expected:?}, but the logs hold its {found:?}; evaluate on logs with the same columns")]
+    #[error(
+        "the drive of {joint} follows a {expected:?}, but the logs hold its {found:?}; evaluate on logs with the same columns"
+    )]
     Signal {
         /// Joint.
         joint: String,

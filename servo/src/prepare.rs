@@ -187,7 +187,19 @@ fn joint(
     let dt = episodes.first().map_or(0.02, Episode::dt);
     let feedback = episodes.first().and_then(|e| logged(e, j, signal).and_then(|w| feedback(e, j, w)));
     let goes_off = runs.iter().any(|run| run.on.iter().any(|on| !on) && run.on.iter().any(|on| *on));
-    let mut joint = Joint { name, signal, runs, ranges: ranges(&sizes, dt), start: Law::default(), given: [false; PARAMS], gain: episodes.first().and_then(|e| given.of(&model.joints()[j].name, Some(&e.name)).gain), goes_off, moved, dt, sizes };
+    let mut joint = Joint {
+        name,
+        signal,
+        runs,
+        ranges: ranges(&sizes, dt),
+        start: Law::default(),
+        given: [false; PARAMS],
+        gain: episodes.first().and_then(|e| given.of(&model.joints()[j].name, Some(&e.name)).gain),
+        goes_off,
+        moved,
+        dt,
+        sizes,
+    };
     joint.start[Param::Feedback] = if signal == Signal::Command { 1.0 } else { feedback.unwrap_or(1.0) };
     known.apply(&mut joint);
     joint
@@ -219,7 +231,7 @@ fn ranges(sizes: &Sizes, dt: f64) -> Ranges {
     set(Param::Speed, 0.05 * sizes.top, 2.0 * sizes.top, 0.5 * sizes.top);
     set(Param::DeadBand, 0.0, 0.1, 0.005);
     set(Param::Feedback, 1e-6, 1e6, 1.0);
-    Ranges { bounds, scale }
+    Ranges { bounds, scale, absolute: [f64::NAN; PARAMS] }
 }
 
 impl Joint {

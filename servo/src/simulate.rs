@@ -4,9 +4,9 @@ use crate::law::{Law, Order, Param};
 use crate::run::{Held, Run};
 
 /// Step of the integrator, s: this part of the servo's own time constant, within these bounds.
-pub const STEP_PART: f64 = 0.15;
+pub const STEP_PART: f64 = 0.08;
 /// Least and greatest step, s.
-pub const STEPS: [f64; 2] = [2e-3, 1e-2];
+pub const STEPS: [f64; 2] = [1e-3, 1e-2];
 
 /// Positions at the samples of a run, rad, into `out`, from the first measured one at rest.
 pub fn simulate(law: &Law, run: &Run, out: &mut Vec<f64>) {

@@ -28,7 +28,8 @@ pub(crate) fn parse(contents: &Contents, joints: &[String], options: &ReadOption
     let (delimiter, mut reader) = open(text);
     let mut header = header(&mut reader)?;
     notes.extend(joint_names::matched(&mut header, joints, &options.map, false));
-    let mut plan = plan(&header, joints, &options.map).map_err(|error| separator_hint(error, &header, delimiter))?;
+    let mut plan = plan(&header, joints, &options.map, options.without_effort)
+        .map_err(|error| separator_hint(error, &header, delimiter))?;
     notes.extend(plan.notes.iter().cloned());
     // The row below the header is looked at by a reader of its own: it may be one of the samples.
     let mut ahead = open(text).1;

@@ -19,11 +19,17 @@ pub enum Channel {
     Temperature,
     /// Known external effort, positive in the joint's direction, added to `effort`, N m or N.
     Disturbance,
+    /// Motor current where the torque constant is not known, A.
+    Current,
+    /// Voltage at the motor, duty times supply, V.
+    Voltage,
+    /// 1 where the motor is on, 0 where it is off.
+    Enabled,
 }
 
 impl Channel {
     /// All channels, in the order in which they are written.
-    pub const ALL: [Channel; 7] = [
+    pub const ALL: [Channel; 10] = [
         Channel::Position,
         Channel::Velocity,
         Channel::Effort,
@@ -31,6 +37,9 @@ impl Channel {
         Channel::EffortLink,
         Channel::Temperature,
         Channel::Disturbance,
+        Channel::Current,
+        Channel::Voltage,
+        Channel::Enabled,
     ];
 
     /// Name in a column header, before the dot.
@@ -43,6 +52,9 @@ impl Channel {
             Channel::EffortLink => "effort_link",
             Channel::Temperature => "temperature",
             Channel::Disturbance => "disturbance",
+            Channel::Current => "current",
+            Channel::Voltage => "voltage",
+            Channel::Enabled => "enabled",
         }
     }
 
@@ -51,9 +63,19 @@ impl Channel {
         Channel::ALL.into_iter().find(|channel| channel.name() == name)
     }
 
-    /// Whether every log must carry it for every joint.
+    /// Whether every log must carry it for every joint; of effort, unless logs without it are asked for.
     pub fn is_needed(self) -> bool {
         matches!(self, Channel::Position | Channel::Effort)
+    }
+
+    /// Whether it can stand in for the effort of a joint.
+    pub fn drives(self) -> bool {
+        matches!(self, Channel::Effort | Channel::Current | Channel::Voltage | Channel::Command)
+    }
+
+    /// Whether an empty cell means that the quantity is not known there, in logs that may lack the effort.
+    pub(crate) fn may_be_unknown(self) -> bool {
+        matches!(self, Channel::Command | Channel::Current | Channel::Voltage)
     }
 }
 
@@ -73,9 +95,10 @@ pub struct Episode {
     pub position: Samples,
     /// Measured velocity, rad/s or m/s.
     pub velocity: Option<Samples>,
-    /// Torque of the drive, N m or N, held from each sample to the next.
+    /// Torque of the drive, N m or N, held from each sample to the next. Without rows where no joint's is known; NaN for
+    /// joints whose is not.
     pub effort: Samples,
-    /// Position reference of the servo, rad or m.
+    /// Position reference of the servo, rad or m. NaN where it is not known, in logs that may lack the effort.
     pub command: Option<Samples>,
     /// Torque on the link side of the gear, N m or N.
     pub effort_link: Option<Samples>,
@@ -85,6 +108,12 @@ pub struct Episode {
     pub disturbance: Option<Samples>,
     /// Joints whose effort tells nothing, by index: it was not recorded, or what stands there is no torque.
     pub effort_unknown: Vec<usize>,
+    /// Motor current, A; NaN where it is not known.
+    pub current: Option<Samples>,
+    /// Voltage at the motor, V; NaN where it is not known.
+    pub voltage: Option<Samples>,
+    /// 1 where the motor is on, 0 where it is off; NaN for joints of which the log does not say.
+    pub enabled: Option<Samples>,
 }
 
 impl Episode {
@@ -123,16 +152,24 @@ impl Episode {
         if dt > 0.0 { 1.0 / dt } else { 0.0 }
     }
 
+    /// Whether the log holds the effort of every joint.
+    pub fn has_effort(&self) -> bool {
+        self.effort.len() == self.joints.len() && self.effort.iter().all(|row| row.iter().all(|e| e.is_finite()))
+    }
+
     /// The samples of a channel, where the log has it.
     pub fn channel(&self, channel: Channel) -> Option<&Samples> {
         match channel {
             Channel::Position => Some(&self.position),
             Channel::Velocity => self.velocity.as_ref(),
-            Channel::Effort => Some(&self.effort),
+            Channel::Effort => (!self.effort.is_empty()).then_some(&self.effort),
             Channel::Command => self.command.as_ref(),
             Channel::EffortLink => self.effort_link.as_ref(),
             Channel::Temperature => self.temperature.as_ref(),
             Channel::Disturbance => self.disturbance.as_ref(),
+            Channel::Current => self.current.as_ref(),
+            Channel::Voltage => self.voltage.as_ref(),
+            Channel::Enabled => self.enabled.as_ref(),
         }
     }
 
@@ -145,6 +182,9 @@ impl Episode {
             Channel::EffortLink => self.effort_link = Some(samples),
             Channel::Temperature => self.temperature = Some(samples),
             Channel::Disturbance => self.disturbance = Some(samples),
+            Channel::Current => self.current = Some(samples),
+            Channel::Voltage => self.voltage = Some(samples),
+            Channel::Enabled => self.enabled = Some(samples),
         }
     }
 

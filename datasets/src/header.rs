@@ -31,8 +31,8 @@ pub(crate) struct Plan {
     pub feeds: Vec<Feed>,
     /// Channels that the file carries for every joint.
     pub channels: Vec<Channel>,
-    /// Joints for which the disturbance is zero, for want of a column.
-    pub undisturbed: Vec<usize>,
+    /// Channels and joints without a column: a disturbance is zero there, anything else not known.
+    pub columnless: Vec<(Channel, usize)>,
     /// What was left out, about the file.
     pub notes: Vec<String>,
 }
@@ -45,9 +45,12 @@ impl Plan {
         let count = time.len();
         let mut episode = Episode { joints: joints.to_vec(), time, ..Episode::default() };
         for &channel in &self.channels {
-            let zero = |joint: usize| channel == Channel::Disturbance && self.undisturbed.contains(&joint);
+            let filler = if channel == Channel::Disturbance { 0.0 } else { f64::NAN };
             let samples = (0..joints.len())
-                .map(|joint| if zero(joint) { vec![0.0; count] } else { numbers.next().unwrap_or_default() })
+                .map(|joint| match self.columnless.contains(&(channel, joint)) {
+                    true => vec![filler; count],
+                    false => numbers.next().unwrap_or_default(),
+                })
                 .collect();
             if !dropped.contains(&channel) {
                 episode.set_channel(channel, samples);
@@ -58,8 +61,15 @@ impl Plan {
 }
 
 /// Reads the header: which of `columns` feed the channels of `joints`. Errors do not carry the file's name yet.
-pub(crate) fn plan(columns: &[String], joints: &[String], map: &ColumnMap) -> Result<Plan, LogError> {
-    let header = Header { columns, joints, map };
+///
+/// `without_effort`: a joint may have a command, current or voltage in the place of its effort.
+pub(crate) fn plan(
+    columns: &[String],
+    joints: &[String],
+    map: &ColumnMap,
+    without_effort: bool,
+) -> Result<Plan, LogError> {
+    let header = Header { columns, joints, map, without_effort };
     header.check_is_header()?;
     let mut used = BTreeSet::new();
     let time = header.time()?;
@@ -69,7 +79,7 @@ pub(crate) fn plan(columns: &[String], joints: &[String], map: &ColumnMap) -> Re
         trailing: columns.len() > 1 && columns.last().is_some_and(String::is_empty),
         feeds: vec![time],
         channels: Vec::new(),
-        undisturbed: Vec::new(),
+        columnless: Vec::new(),
         notes: Vec::new(),
     };
     if let Some((channel, joint)) = map.unknown_joint(joints) {
@@ -96,6 +106,7 @@ struct Header<'a> {
     columns: &'a [String],
     joints: &'a [String],
     map: &'a ColumnMap,
+    without_effort: bool,
 }
 
 impl Header<'_> {
@@ -249,6 +260,12 @@ impl Header<'_> {
         let name = channel.name();
         if missing.is_empty() {
             plan.channels.push(channel);
+        } else if self.servo_channel(channel, &missing)? {
+            if missing.len() == found.len() {
+                return Ok(());
+            }
+            plan.channels.push(channel);
+            plan.columnless.extend(missing.into_iter().map(|joint| (channel, joint)));
         } else if channel.is_needed() {
             return Err(self.missing(channel, &missing));
         } else if missing.len() < found.len() {
@@ -256,7 +273,7 @@ impl Header<'_> {
             if channel == Channel::Disturbance {
                 plan.notes.push(format!("has no column disturbance.* for {}: taken as zero there", joints.join(", ")));
                 plan.channels.push(channel);
-                plan.undisturbed = missing;
+                plan.columnless.extend(missing.into_iter().map(|joint| (channel, joint)));
             } else {
                 plan.notes.push(format!(
                     "has no column {name}.* for {}: {name} is left out for all joints; give it for all, or for none",
@@ -269,6 +286,23 @@ impl Header<'_> {
         }
         plan.feeds.extend(found.into_iter().flatten());
         Ok(())
+    }
+
+    /// Whether some joints may lack this channel because something else tells what drives them.
+    fn servo_channel(&self, channel: Channel, missing: &[usize]) -> Result<bool, LogError> {
+        if !self.without_effort || !(channel.drives() || channel == Channel::Enabled) {
+            return Ok(false);
+        }
+        if channel == Channel::Effort {
+            for &joint in missing {
+                let others = [Channel::Current, Channel::Voltage, Channel::Command];
+                let fed = others.into_iter().map(|other| self.feed(other, &self.joints[joint]));
+                if !fed.collect::<Result<Vec<_>, _>>()?.iter().any(Option::is_some) {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
     }
 
     /// A needed channel that lacks joints.
@@ -322,7 +356,7 @@ impl Header<'_> {
         } else if !foreign.is_empty() {
             format!("If one of {} holds it: --map \"{target}=<that column>\"", list(&foreign, 6))
         } else if channel == Channel::Effort && missing.len() == self.joints.len() {
-            "A diagnosis needs the torque of the drives in N m: record it, or map the motor current to it with the torque constant as its scale"
+            "Record the torque of the drives in N m, or what stands for it: the set point (command.*), the motor's current (current.*) or voltage (voltage.*)"
                 .to_owned()
         } else {
             "Log every joint of the robot, or hold those that do not move: --lock".to_owned()
@@ -404,7 +438,7 @@ mod tests {
     }
 
     fn planned(header: &str, map: &[&str]) -> Result<Plan, LogError> {
-        plan(&columns(header), &columns("a,b"), &ColumnMap::from_pairs(map).unwrap())
+        plan(&columns(header), &columns("a,b"), &ColumnMap::from_pairs(map).unwrap(), false)
     }
 
     const FULL: &str = "time,position.a,position.b,effort.a,effort.b";
@@ -448,7 +482,25 @@ mod tests {
         assert!(plan.notes.len() == 1 && plan.notes[0].contains("velocity"), "{:?}", plan.notes);
         let plan = planned(&format!("{FULL},disturbance.b"), &[]).unwrap();
         assert_eq!(plan.channels.last(), Some(&Channel::Disturbance));
-        assert_eq!(plan.undisturbed, [0]);
+        assert_eq!(plan.columnless, [(Channel::Disturbance, 0)]);
+    }
+
+    #[test]
+    fn what_drives_a_joint_stands_in_for_its_effort_where_that_is_asked_for() {
+        let planned = |header: &str, without| plan(&columns(header), &columns("a,b"), &ColumnMap::default(), without);
+        let servo = "time,position.a,position.b,command.a,command.b,voltage.b";
+        assert_eq!(planned(servo, false).unwrap_err().kind, LogErrorKind::MissingJoint);
+        let plan = planned(servo, true).unwrap();
+        assert_eq!(plan.channels, [Channel::Position, Channel::Command, Channel::Voltage]);
+        assert_eq!(plan.columnless, [(Channel::Voltage, 0)]);
+        let episode =
+            plan.episode(vec![vec![0.0], vec![1.0], vec![2.0], vec![3.0], vec![4.0], vec![5.0]], &[], &columns("a,b"));
+        assert!(episode.effort.is_empty() && !episode.has_effort());
+        let voltage = episode.voltage.unwrap();
+        assert!(voltage[0][0].is_nan() && voltage[1] == [5.0]);
+        // A joint with nothing at all is an error still.
+        let error = planned("time,position.a,position.b,command.a", true).unwrap_err();
+        assert!(error.found.contains("effort of `b`"), "{error}");
     }
 
     #[test]

@@ -21,6 +21,9 @@ pub struct ReadOptions {
     /// Where a cell of `velocity`, `command`, `effort_link` or `temperature` holds no number, leave the channel out for
     /// that file, with a finding, instead of failing.
     pub drop_bad_channels: bool,
+    /// Read logs in which joints have a command, current or voltage in the place of their effort; an empty cell of these
+    /// then means that the quantity is not known there.
+    pub without_effort: bool,
 }
 
 #[cfg(feature = "parquet")]

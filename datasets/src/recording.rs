@@ -32,7 +32,8 @@ impl Recording {
         let time_scale = self.name_time(request);
         let mut names: Vec<String> = self.columns.iter().map(|(name, _)| name.trim().to_owned()).collect();
         self.notes.extend(joint_names::matched(&mut names, joints, &request.options.map, true));
-        let plan = plan(&names, joints, &request.options.map).map_err(|error| LogError { row: None, ..error })?;
+        let plan = plan(&names, joints, &request.options.map, request.options.without_effort)
+            .map_err(|error| LogError { row: None, ..error })?;
         self.notes.extend(plan.notes.iter().cloned());
         let count = self.columns[plan.feeds[0].index].1.len();
         if count == 0 {
@@ -55,7 +56,9 @@ impl Recording {
             }
             let values: Vec<f64> =
                 values.iter().map(|value| if scale == 1.0 { *value } else { value * scale }).collect();
-            if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
+            let unknown = request.options.without_effort && feed.channel.is_some_and(Channel::may_be_unknown);
+            let bad = |value: &f64| !(value.is_finite() || unknown && value.is_nan());
+            if let Some(bad) = values.iter().position(bad) {
                 match feed.channel.filter(|&channel| can_be_left_out(channel)) {
                     Some(channel) => self.leave_out(channel, bad, &feed.column, &mut dropped),
                     None => return Err(not_finite(values[bad], bad, &self.columns[feed.index].0)),

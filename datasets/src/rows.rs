@@ -163,6 +163,9 @@ impl<'a> Rows<'a> {
 
     fn number(&self, cell: &[u8], feed: &Feed) -> Result<f64, LogError> {
         let cell = cell.trim_ascii();
+        if cell.is_empty() && self.options.without_effort && feed.channel.is_some_and(Channel::may_be_unknown) {
+            return Ok(f64::NAN);
+        }
         let text = std::str::from_utf8(cell).ok();
         // Where commas do not part cells, one in a number is its decimal mark.
         let comma = |text: &str| text.replace(',', ".").parse().ok().filter(|_| self.delimiter != b',');

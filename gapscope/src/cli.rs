@@ -102,6 +102,9 @@ pub struct Diagnose {
     /// Replace results that are in the folder already
     #[arg(long)]
     pub force: bool,
+    /// What is known of the servos, where logs hold no torque: gains, constants, limits, as numbers or ranges (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub drive: Option<PathBuf>,
     /// Print what was proposed, against what, and by how much the logs spoke for or against it
     #[arg(long)]
     pub why: bool,
@@ -145,6 +148,9 @@ pub struct Evaluate {
     /// Corrected model that `diagnose` wrote
     #[arg(long, value_name = "FILE")]
     pub with: Option<PathBuf>,
+    /// What is known of the servos, where logs hold no torque: gains, constants, limits, as numbers or ranges (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub drive: Option<PathBuf>,
     /// Print one JSON object and nothing else
     #[arg(long)]
     pub json: bool,

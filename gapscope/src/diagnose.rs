@@ -1,8 +1,8 @@
 //! `gapscope diagnose`.
 
 use crate::cli::Diagnose;
-use crate::input::{Loaded, load};
-use crate::{output, report, summary};
+use crate::input::{Loaded, load_any};
+use crate::{output, report, servo, summary};
 use anyhow::{Context, Result};
 use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, diagnose};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -18,7 +18,12 @@ pub fn run(args: &Diagnose) -> Result<String> {
     let out = output::folder(args.out.as_deref(), first, args.force)?;
     let progress = Progress::new();
     progress.stage("reading robot and logs", 0.0);
-    let loaded = load(&args.input)?;
+    let loaded = load_any(&args.input)?;
+    if servo::lacks_effort(&loaded) {
+        let text = servo::diagnose(args, loaded, &out, &|stage, part| progress.stage(stage, part))?;
+        progress.finish();
+        return Ok(text);
+    }
     let mut outcome = diagnosed(loaded, &progress)?;
     outcome.evidence.robot_file = args.input.robot.display().to_string();
     outcome.evidence.logs = args.input.logs.iter().map(|l| l.display().to_string()).collect();

@@ -1,8 +1,8 @@
 //! `gapscope evaluate`.
 
 use crate::cli::Evaluate;
-use crate::input::{load, strangeness};
-use crate::{output, summary};
+use crate::input::{load_any, strangeness};
+use crate::{output, servo, summary};
 use anyhow::{Context, Result, bail};
 use gapscope_diagnosis::{Corrected, Predictions, evaluate};
 use gapscope_dynamics::Model;
@@ -16,7 +16,10 @@ pub fn run(args: &Evaluate) -> Result<String> {
     if let Some(file) = args.predictions.as_ref().filter(|f| f.exists() && !args.force) {
         bail!("{} exists already; choose another name, or allow it to be replaced with --force", file.display());
     }
-    let mut loaded = load(&args.input)?;
+    let mut loaded = load_any(&args.input)?;
+    if servo::lacks_effort(&loaded) {
+        return servo::evaluate(args, &loaded);
+    }
     let corrected = match &args.with {
         Some(file) => {
             let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;

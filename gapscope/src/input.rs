@@ -4,8 +4,8 @@ use crate::cli::Input;
 use crate::robot;
 use anyhow::{Context, Result, bail};
 use gapscope_datasets::{
-    Calibration, ColumnMap, Doubt, Episode, Fault, LONGEST_STEP, ReadOptions, check_logs, digest, find_faults, mend,
-    read_logs,
+    Calibration, ColumnMap, Doubt, Episode, Fault, Faults, LONGEST_STEP, ReadOptions, check_logs, digest, find_faults,
+    mend, read_logs,
 };
 use gapscope_diagnosis::Origin;
 use gapscope_dynamics::{Finding, Model};
@@ -63,8 +63,19 @@ pub fn fault_line(fault: &Fault) -> String {
 /// # Errors
 /// A file that cannot be read or that breaks a rule; the text names file, place and mend.
 pub fn load(input: &Input) -> Result<Loaded> {
+    load_with(input, options(input)?)
+}
+
+/// As [`load`], of logs that may hold a set point, current or voltage in the place of the effort.
+///
+/// # Errors
+/// As those of [`load`].
+pub fn load_any(input: &Input) -> Result<Loaded> {
+    load_with(input, ReadOptions { without_effort: true, ..options(input)? })
+}
+
+fn load_with(input: &Input, options: ReadOptions) -> Result<Loaded> {
     let description = robot::read(&input.robot, &input.xacro_args)?;
-    let options = options(input)?;
     let mut locked = input.lock.clone();
     let mut said = Vec::new();
     loop {
@@ -88,7 +99,9 @@ pub fn load(input: &Input) -> Result<Loaded> {
 
 /// Holds the logs against themselves and the model, and undoes what is wrong with them beyond doubt.
 fn checked(input: &Input, model: Model, episodes: Vec<Episode>, said: Vec<Finding>) -> Result<Loaded> {
-    let mut found = find_faults(&model, &episodes);
+    // What is told by the torque that the robot takes has nothing to hold it against without one.
+    let told = episodes.iter().all(Episode::has_effort);
+    let mut found = if told { find_faults(&model, &episodes) } else { Faults::default() };
     let (model, episodes) = if input.as_logged {
         found.faults.iter_mut().for_each(|fault| fault.mended = false);
         (model, episodes)
@@ -134,6 +147,7 @@ pub fn options(input: &Input) -> Result<ReadOptions> {
         skip_bad_files: input.skip_bad_logs,
         // A hole in a channel that nothing here needs is worth a finding, not the log.
         drop_bad_channels: true,
+        without_effort: false,
     })
 }
 

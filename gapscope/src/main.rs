@@ -15,6 +15,7 @@ mod picture;
 mod report;
 mod robot;
 mod rollout;
+mod servo;
 mod study;
 mod summary;
 mod train;

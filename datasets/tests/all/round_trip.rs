@@ -23,6 +23,9 @@ fn episode() -> Episode {
         temperature: Some(channel(1)),
         disturbance: Some(channel(0)),
         effort_unknown: Vec::new(),
+        current: None,
+        voltage: None,
+        enabled: None,
     };
     episode.effort[0][..6].copy_from_slice(&[0.0, -0.0, f64::MIN_POSITIVE, 5e-324, f64::MAX, 1e15]);
     episode

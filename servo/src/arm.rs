@@ -1,0 +1,104 @@
+//! The whole arm, simulated freely under its set points: all joints at once, coupled by the model's mass matrix.
+//!
+//! Each step solves (M/h + D) v⁺ = rhs − friction by sweeps over the joints, each joint with its own law and its own dry
+//! friction (projected Gauss–Seidel, as in Moreau's time stepping). Rows are in units of what each drive follows.
+
+use crate::law::{Law, Order, Param};
+use crate::prepare::Joint;
+use gapscope_dynamics::{Data, Model};
+use nalgebra::DMatrix;
+
+/// Sweeps of a step; they end earlier once no speed changes by more than a part in 10¹⁰ of the fastest.
+const SWEEPS: usize = 40;
+const SETTLED: f64 = 1e-10;
+
+/// Positions of all joints at the samples of a log, `[joint][sample]`, rad, from the first measured ones at rest. A joint
+/// without a law follows its set point perfectly while its motor is on, and is the bare model's while it is off.
+///
+/// Positions that cannot be, of a law that is no servo's, end the simulation: the rest is NaN.
+pub fn simulate_arm(model: &Model, laws: &[Option<Law>], joints: &[Joint], log: usize) -> Vec<Vec<f64>> {
+    let n = model.dof();
+    let time = &joints[0].runs[log].time;
+    let mut data = Data::new(model);
+    let mut mass = DMatrix::zeros(n, n);
+    let bare = {
+        let mut law = Law::default();
+        law[Param::Scale] = 1.0;
+        law
+    };
+    let mut q: Vec<f64> = joints.iter().map(|joint| joint.runs[log].position[0]).collect();
+    let mut v = vec![0.0; n];
+    let [mut turned, mut bias, mut end, mut load, mut push, mut factor, mut bound, mut delivered] =
+        std::array::from_fn(|_| vec![0.0; n]);
+    let mut hints = vec![0; n];
+    let mut path: Vec<Vec<f64>> = q.iter().map(|&q| vec![q]).collect();
+    let step = joints.iter().map(|joint| joint.runs[log].step).fold(f64::INFINITY, f64::min);
+    for k in 0..time.len() - 1 {
+        let dt = time[k + 1] - time[k];
+        let parts = (dt / step - 1e-6).ceil().max(1.0);
+        let h = dt / parts;
+        for part in 0..parts as usize {
+            let t = time[k] + part as f64 * h;
+            for j in 0..n {
+                turned[j] = q[j] - laws[j].map_or(0.0, |law| law[Param::Offset]);
+            }
+            model.mass_matrix(&mut data, &turned, &mut mass);
+            model.bias(&mut data, &turned, &v, &mut bias);
+            for j in 0..n {
+                let run = &joints[j].runs[log];
+                let law = laws[j].unwrap_or(bare);
+                let order = match (run.on[k], &run.target, &run.delivered) {
+                    (false, _, _) | (true, None, None) => Order::Off,
+                    (true, Some(target), _) => {
+                        let mean = target.mean(t - law[Param::Latency], h, &mut hints[j]);
+                        Order::Follow(mean, law[Param::Feedback] * run.gain)
+                    }
+                    (true, None, Some(w)) => Order::Deliver(w.mean(t - law[Param::Latency], h, &mut hints[j])),
+                };
+                let row = law.row(h, q[j], v[j], order, load[j]);
+                let sigma = law[Param::Scale];
+                let carried: f64 = (0..n).map(|i| mass[(j, i)] * v[i]).sum();
+                push[j] = row.push + sigma * (carried / h - bias[j]);
+                factor[j] = row.factor + sigma * mass[(j, j)] / h;
+                (bound[j], delivered[j], load[j]) = (row.bound, row.delivered, row.torque);
+                end[j] = v[j];
+                if laws[j].is_none()
+                    && run.on[k]
+                    && let Some(target) = &run.target
+                {
+                    // Perfect tracking: at the next sample the joint stands at the set point of that sample.
+                    end[j] = (target.at(k + 1) - q[j]) / (time[k + 1] - t);
+                    factor[j] = f64::NAN;
+                }
+            }
+            for _ in 0..SWEEPS {
+                let mut change = 0.0_f64;
+                for j in (0..n).filter(|&j| !factor[j].is_nan()) {
+                    let law = laws[j].unwrap_or(bare);
+                    let others: f64 = (0..n).filter(|&i| i != j).map(|i| mass[(j, i)] * end[i]).sum();
+                    let rest = push[j] - law[Param::Scale] * others / h;
+                    let speed = law.settle(factor[j], rest, bound[j], delivered[j]);
+                    change = change.max((speed - end[j]).abs());
+                    end[j] = speed;
+                }
+                let fastest = end.iter().fold(0.0_f64, |a, v| a.max(v.abs()));
+                if change <= SETTLED * fastest {
+                    break;
+                }
+            }
+            for j in 0..n {
+                q[j] = if factor[j].is_nan() { q[j] + h * end[j] } else { Law::move_on(h, q[j], v[j], end[j]) };
+                v[j] = end[j];
+            }
+        }
+        let sound = q.iter().all(|q| q.is_finite() && q.abs() < 1e6);
+        for j in 0..n {
+            path[j].push(if sound { q[j] } else { f64::NAN });
+        }
+        if !sound {
+            path.iter_mut().for_each(|row| row.resize(time.len(), f64::NAN));
+            break;
+        }
+    }
+    path
+}

@@ -1,0 +1,225 @@
+//! The law of one servo joint, in units of what its drive follows.
+//!
+//! A drive turns a signal w into a torque s·w: the error of the set point (rad), a voltage (V), a current (A) or a torque
+//! itself (N m). Divided by s, the joint's equation of motion is
+//!
+//! w = σ (M q̈ + c + g(q − ζ)) + α q̈ + (β·on + ν) q̇ + friction − δ,   σ = 1/s,
+//!
+//! linear in all that a log may or may not determine: where gravity and the bodies' inertia do not show, σ goes to zero and the
+//! ratios stay. Friction is set-valued at rest, and its bound is φ + ρ e^{−(q̇/v)²} + (μ + μ_s e^{−(q̇/v)²}) abs(w).
+//! Source of the friction with load: Duclusaud, Passault, Padois, Ly, "Extended friction models for the physics simulation of
+//! servo actuators", ICRA 2025.
+
+/// A parameter of a joint's law. `Scale` is 1/s; torques are in units of w.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(usize)]
+pub enum Param {
+    /// σ, unit of w per N m.
+    Scale,
+    /// α, unit of w per rad/s².
+    Armature,
+    /// β, unit of w per rad/s: derivative gain and back-EMF, gone where the motor is off.
+    Damping,
+    /// ν, the same of viscous friction, always there.
+    Viscous,
+    /// φ, unit of w.
+    Coulomb,
+    /// ρ, unit of w.
+    Rise,
+    /// v, rad/s.
+    StribeckVelocity,
+    /// μ.
+    Load,
+    /// μ_s.
+    LoadRise,
+    /// δ, unit of w.
+    Bias,
+    /// ζ, rad: measured less true position.
+    Offset,
+    /// Time by which the set point acts late, s.
+    Latency,
+    /// Greatest w.
+    Limit,
+    /// Greatest speed, rad/s.
+    Speed,
+    /// Error of the set point within which the drive does nothing, rad.
+    DeadBand,
+    /// Unit of w per rad of set point error, at the gain of the first log.
+    Feedback,
+}
+
+/// How many parameters a law has.
+pub const PARAMS: usize = 16;
+
+impl Param {
+    /// All, in the order of [`Law::values`].
+    pub const ALL: [Param; PARAMS] = [
+        Param::Scale,
+        Param::Armature,
+        Param::Damping,
+        Param::Viscous,
+        Param::Coulomb,
+        Param::Rise,
+        Param::StribeckVelocity,
+        Param::Load,
+        Param::LoadRise,
+        Param::Bias,
+        Param::Offset,
+        Param::Latency,
+        Param::Limit,
+        Param::Speed,
+        Param::DeadBand,
+        Param::Feedback,
+    ];
+
+    /// Whether its unit is that of w over something, so that 1/σ makes a torque of it.
+    pub fn is_torque(self) -> bool {
+        matches!(
+            self,
+            Param::Armature
+                | Param::Damping
+                | Param::Viscous
+                | Param::Coulomb
+                | Param::Rise
+                | Param::Bias
+                | Param::Limit
+        )
+    }
+}
+
+/// The parameters of one joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Law {
+    /// By [`Param`].
+    pub values: [f64; PARAMS],
+}
+
+impl Default for Law {
+    /// A drive without limits and a joint without friction; infinite stiffness.
+    fn default() -> Law {
+        let mut values = [0.0; PARAMS];
+        values[Param::StribeckVelocity as usize] = 1.0;
+        values[Param::Limit as usize] = f64::INFINITY;
+        values[Param::Speed as usize] = f64::INFINITY;
+        values[Param::Feedback as usize] = 1.0;
+        Law { values }
+    }
+}
+
+impl std::ops::Index<Param> for Law {
+    type Output = f64;
+    fn index(&self, param: Param) -> &f64 {
+        &self.values[param as usize]
+    }
+}
+
+impl std::ops::IndexMut<Param> for Law {
+    fn index_mut(&mut self, param: Param) -> &mut f64 {
+        &mut self.values[param as usize]
+    }
+}
+
+/// Weight of a step's end in the implicit rule: at one half it is of second order and rings where inertia is next to nothing;
+/// this loses a tenth of a step of phase and damps by a third a step.
+const END: f64 = 0.6;
+
+/// What a drive is told over a step.
+#[derive(Debug, Clone, Copy)]
+pub enum Order {
+    /// Follow a set point (rad), mean over the step, with a gain (unit of w per rad).
+    Follow(f64, f64),
+    /// Deliver w.
+    Deliver(f64),
+    /// Motor off.
+    Off,
+}
+
+/// What a step of one joint comes to before other joints and friction: (`inertia` + …) v⁺ = `impulse` ∓ friction, all over h.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// Factor of the speed at the end, without σM/h.
+    pub factor: f64,
+    /// Right-hand side, without σ(M v/h − c − g).
+    pub push: f64,
+    /// Bound of dry friction.
+    pub bound: f64,
+    /// w that is delivered if the joint stays where it is.
+    pub delivered: f64,
+    /// The same less what damping takes, at the speed where the step begins.
+    pub torque: f64,
+}
+
+/// Part of a step at the end of which the position enters the feedback: half of the way that the step makes.
+fn way(h: f64) -> f64 {
+    0.5 * h
+}
+
+impl Law {
+    /// Time constant of the closed loop, s: damping over stiffness, or the period of the undamped loop over 2π where that is
+    /// longer; `inertia` is σ M.
+    pub fn time_constant(&self, inertia: f64) -> f64 {
+        let stiffness = self[Param::Feedback].max(1e-9);
+        let slow = (self[Param::Damping] + self[Param::Viscous]) / stiffness;
+        slow.max(((self[Param::Scale] * inertia + self[Param::Armature]) / stiffness).sqrt())
+    }
+
+    /// Position at the end of a step, rad.
+    pub fn move_on(h: f64, q: f64, v: f64, v_end: f64) -> f64 {
+        q + h * ((1.0 - END) * v + END * v_end)
+    }
+
+    /// The row of a step of `h` s from (q, v) under an order; `load` is the w delivered in the step before.
+    #[inline]
+    pub fn row(&self, h: f64, q: f64, v: f64, order: Order, load: f64) -> Row {
+        let p = &self.values;
+        let damping =
+            p[Param::Viscous as usize] + if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] };
+        let (mut stiffness, mut w) = match order {
+            Order::Off => (0.0, 0.0),
+            Order::Deliver(w) => (0.0, w),
+            Order::Follow(target, gain) => {
+                let error = target - q;
+                if error.abs() < p[Param::DeadBand as usize] { (0.0, 0.0) } else { (gain, gain * error) }
+            }
+        };
+        let limit = p[Param::Limit as usize];
+        if w.abs() > limit {
+            (stiffness, w) = (0.0, limit.copysign(w));
+        }
+        let drag = stiffness * way(h) + damping;
+        let armature = p[Param::Armature as usize] / h;
+        let mut bound = p[Param::Coulomb as usize];
+        let (rise, load_rise) = (p[Param::Rise as usize], p[Param::LoadRise as usize]);
+        let mut loaded = p[Param::Load as usize];
+        if rise > 0.0 || load_rise > 0.0 {
+            let ratio = v / p[Param::StribeckVelocity as usize];
+            let fade = (-ratio * ratio).exp();
+            bound += rise * fade;
+            loaded += load_rise * fade;
+        }
+        bound += loaded * load.abs();
+        Row {
+            factor: armature + END * drag,
+            push: armature * v + w + p[Param::Bias as usize] - (1.0 - END) * drag * v,
+            bound,
+            delivered: w,
+            torque: w - if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] * v },
+        }
+    }
+
+    /// Speed at the end of a step from the whole factor and push of a row.
+    #[inline]
+    pub fn settle(&self, factor: f64, push: f64, bound: f64, delivered: f64) -> f64 {
+        if push.abs() <= bound {
+            return 0.0;
+        }
+        let end = (push - bound.copysign(push)) / factor;
+        let most = self.values[Param::Speed as usize];
+        // The drive does not push beyond its speed; a load may.
+        if end.abs() > most && delivered * end > 0.0 {
+            let without = (push - delivered - bound.copysign(push)) / factor;
+            return end.signum() * most.max(end.signum() * without);
+        }
+        end
+    }
+}

@@ -1,0 +1,34 @@
+//! Servo arms whose logs hold no torque: what drives them, which effects they have, how far their closed loop is from the robot.
+//!
+//! Logs become a [`Joint`] each with its [`Run`]s; [`choose`] finds its [`Law`] by output error; [`diagnose`] says where, which
+//! and how far for the whole arm; a [`ServoModel`] is what it leaves for other logs.
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod arm;
+mod around;
+mod choose;
+mod diagnose;
+mod fit;
+mod gap;
+mod given;
+mod interval;
+mod kinds;
+mod law;
+mod model;
+mod prepare;
+mod run;
+pub mod schema;
+mod simulate;
+
+pub use arm::simulate_arm;
+pub use choose::{Chosen, Comparison, choose};
+pub use diagnose::{Outcome, diagnose, evaluate};
+pub use fit::{Fit, Ranges, cost, fit};
+pub use given::{Constants, Given, GivenError, Known};
+pub use interval::{Interval, Spread};
+pub use kinds::Kind;
+pub use law::{Law, Order, Param, Row};
+pub use model::{DriveModel, MODEL_SCHEMA, ServoModel, ServoModelError};
+pub use prepare::{Joint, Sizes, joints};
+pub use run::{Held, Run, Signal, Surroundings};
+pub use simulate::{errors, simulate};

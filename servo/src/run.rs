@@ -1,0 +1,148 @@
+//! One joint's part of one log, ready to be simulated alone: what it was told, and what the rest of the arm does to it.
+
+use gapscope_datasets::Episode;
+
+/// What stands in the place of a joint's torque.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Signal {
+    /// Set point alone: torque per rad of error.
+    Command,
+    /// Voltage: torque per V.
+    Voltage,
+    /// Current: torque per A.
+    Current,
+    /// Torque itself.
+    Effort,
+}
+
+impl Signal {
+    /// Unit of w.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Signal::Command => "rad",
+            Signal::Voltage => "V",
+            Signal::Current => "A",
+            Signal::Effort => "N m",
+        }
+    }
+}
+
+/// A signal that is held from each sample to the next, with its integral: its mean over any span is exact.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Held {
+    time: Vec<f64>,
+    values: Vec<f64>,
+    integral: Vec<f64>,
+}
+
+impl Held {
+    /// Of samples; what is not known is held from before.
+    pub fn new(time: &[f64], samples: &[f64]) -> Held {
+        let mut last = samples.iter().copied().find(|x| x.is_finite()).unwrap_or(0.0);
+        let values: Vec<f64> = samples
+            .iter()
+            .map(|&x| {
+                if x.is_finite() {
+                    last = x;
+                }
+                last
+            })
+            .collect();
+        let mut integral = vec![0.0; values.len()];
+        for k in 1..values.len() {
+            integral[k] = integral[k - 1] + values[k - 1] * (time[k] - time[k - 1]);
+        }
+        Held { time: time.to_vec(), values, integral }
+    }
+
+    /// The value at a sample.
+    pub fn at(&self, k: usize) -> f64 {
+        self.values[k]
+    }
+
+    /// ∫ from the first sample to t; `hint` is a sample near t, moved to the last one before it.
+    fn until(&self, t: f64, hint: &mut usize) -> f64 {
+        let last = self.values.len() - 1;
+        while *hint > 0 && self.time[*hint] > t {
+            *hint -= 1;
+        }
+        while *hint < last && self.time[*hint + 1] <= t {
+            *hint += 1;
+        }
+        // Before the first sample the first value was there.
+        self.integral[*hint] + self.values[*hint] * (t - self.time[*hint])
+    }
+
+    /// Mean from `t` to `t + h`.
+    pub fn mean(&self, t: f64, h: f64, hint: &mut usize) -> f64 {
+        let start = self.until(t, hint);
+        (self.until(t + h, hint) - start) / h
+    }
+}
+
+/// What the rest of the arm does to one joint along a log, a row for each sample. With the joint elsewhere than measured by d,
+/// gravity is `gravity` cos d + `slope` sin d: exact for a joint that turns, as is an inertia that does not change with d.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Surroundings {
+    /// M_jj, kg m².
+    pub inertia: Vec<f64>,
+    /// Gravity torque at the measured position, N m.
+    pub gravity: Vec<f64>,
+    /// Its derivative by the joint's own position, N m/rad.
+    pub slope: Vec<f64>,
+    /// Torque by the motion of other joints, N m.
+    pub coupling: Vec<f64>,
+}
+
+/// One joint's part of one log.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// Time, s, from zero.
+    pub time: Vec<f64>,
+    /// Measured position, rad.
+    pub position: Vec<f64>,
+    /// Set point.
+    pub target: Option<Held>,
+    /// Logged w, where nothing else tells what the drive does.
+    pub delivered: Option<Held>,
+    /// Whether the motor is on, from each sample to the next.
+    pub on: Vec<bool>,
+    /// Gain of this log over the one of the first.
+    pub gain: f64,
+    /// The servo's own number for its gain in this log, where it was given.
+    pub own_gain: Option<f64>,
+    /// w per rad of set point error, where the log shows both.
+    pub seen_feedback: Option<f64>,
+    /// What the rest of the arm does.
+    pub around: Surroundings,
+    /// Weight of each sample's error; zero where it is not compared.
+    pub weight: Vec<f64>,
+    /// Samples at which the simulation starts anew from the log, in order: where no closed loop holds it to the log.
+    pub restarts: Vec<usize>,
+    /// Longest step of the integrator, s.
+    pub step: f64,
+    /// Index of the log.
+    pub log: usize,
+}
+
+impl Run {
+    /// Measured position, rad, and speed by the parabola through the samples around, rad/s.
+    pub fn state(&self, k: usize) -> (f64, f64) {
+        crate::around::state(&self.time, &self.position, k)
+    }
+
+    /// Samples of a channel of one joint, where it has a number.
+    pub fn channel<'a>(samples: &'a Option<Vec<Vec<f64>>>, joint: usize) -> Option<&'a [f64]> {
+        let row = samples.as_ref()?.get(joint)?;
+        row.iter().any(|x| x.is_finite()).then_some(row.as_slice())
+    }
+
+    /// Which samples have the motor on. Where the log does not say, it is on.
+    pub fn enabled(episode: &Episode, joint: usize) -> Vec<bool> {
+        match Run::channel(&episode.enabled, joint) {
+            Some(row) => row.iter().map(|&x| x != 0.0).collect(),
+            None => vec![true; episode.len()],
+        }
+    }
+}

@@ -260,7 +260,11 @@ impl Header<'_> {
         let name = channel.name();
         if missing.is_empty() {
             plan.channels.push(channel);
-        } else if self.servo_channel(channel, &missing)? {
+        } else if self.without_effort && (channel.drives() || channel == Channel::Enabled) {
+            let undriven = if channel == Channel::Effort { self.undriven(&missing)? } else { Vec::new() };
+            if !undriven.is_empty() {
+                return Err(self.missing(channel, &undriven));
+            }
             if missing.len() == found.len() {
                 return Ok(());
             }
@@ -288,21 +292,17 @@ impl Header<'_> {
         Ok(())
     }
 
-    /// Whether some joints may lack this channel because something else tells what drives them.
-    fn servo_channel(&self, channel: Channel, missing: &[usize]) -> Result<bool, LogError> {
-        if !self.without_effort || !(channel.drives() || channel == Channel::Enabled) {
-            return Ok(false);
-        }
-        if channel == Channel::Effort {
-            for &joint in missing {
-                let others = [Channel::Current, Channel::Voltage, Channel::Command];
-                let fed = others.into_iter().map(|other| self.feed(other, &self.joints[joint]));
-                if !fed.collect::<Result<Vec<_>, _>>()?.iter().any(Option::is_some) {
-                    return Ok(false);
-                }
+    /// Those of some joints of which nothing tells what drives them.
+    fn undriven(&self, joints: &[usize]) -> Result<Vec<usize>, LogError> {
+        let mut undriven = Vec::new();
+        for &joint in joints {
+            let others = [Channel::Current, Channel::Voltage, Channel::Command];
+            let fed = others.into_iter().map(|other| self.feed(other, &self.joints[joint]));
+            if !fed.collect::<Result<Vec<_>, _>>()?.iter().any(Option::is_some) {
+                undriven.push(joint);
             }
         }
-        Ok(true)
+        Ok(undriven)
     }
 
     /// A needed channel that lacks joints.

@@ -54,10 +54,12 @@ struct Schema {
 #[derive(Debug, thiserror::Error)]
 pub enum CorrectedError {
     /// Not JSON, or not of this shape.
-    #[error("not a corrected model; expected the corrected.json that `gapscope diagnose` writes")]
+    #[error("not a corrected model ({0}); expected the corrected.json that `gapscope diagnose` writes")]
     Unreadable(#[from] serde_json::Error),
     /// The diagnosis itself.
-    #[error("this is a diagnosis, not the corrected model; corrected.json lies beside it")]
+    #[error(
+        "this is a diagnosis (gapscope.diagnosis/1), not the corrected model ({MODEL_SCHEMA}); `gapscope diagnose` wrote corrected.json beside it"
+    )]
     Diagnosis,
     /// Another schema.
     #[error("schema is `{0}`, expected `{MODEL_SCHEMA}`; write the file anew with this version's `gapscope diagnose`")]

@@ -98,7 +98,9 @@ fn mrad(value: f64) -> String {
 fn change(change: &Change) -> String {
     match (change.before, change.after) {
         (Some(before), Some(after)) => {
-            let shrink = change.shrink.map_or("at the floor".to_owned(), |s| format!("−{:.1} %", 100.0 * s));
+            let shrink = change.shrink.map_or("at the floor".to_owned(), |s| {
+                format!("{}{:.1} %", if s < 0.0 { "+" } else { "−" }, 100.0 * s.abs())
+            });
             format!("{} → {}  {shrink}", mrad(before), mrad(after))
         }
         (Some(before), None) => format!("{} → the corrected arm cannot be simulated there", mrad(before)),
@@ -128,15 +130,19 @@ fn figure(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
+fn counted(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
 /// The diagnosis in some lines.
 fn summary(diagnosis: &Diagnosis, out: &Path) -> String {
     let data = &diagnosis.data;
     let mut lines = vec![
         format!(
-            "{} · {} joints, {} episodes, {:.0} s at {:.0} Hz, no torque: what drives each joint was found with its effects",
+            "{} · {}, {}, {:.0} s at {:.0} Hz, no torque: what drives each joint was found with its effects",
             diagnosis.robot,
-            diagnosis.joints.len(),
-            data.episodes,
+            counted(diagnosis.joints.len(), "joint"),
+            counted(data.episodes, "episode"),
             data.duration,
             data.rate
         ),

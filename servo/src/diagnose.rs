@@ -21,6 +21,8 @@ use std::collections::BTreeMap;
 /// Part of the squared gap up to which what is left is nothing, and up to which it is a part.
 const EXPLAINED: f64 = 0.15;
 const PARTLY: f64 = 0.6;
+/// Part of the claims beyond doubt that are there, on servo arms simulated by MuJoCo.
+const THERE: f64 = 0.9;
 /// Steps of a fit with a fold left out: it begins where the whole fit ended.
 const FOLD: usize = 8;
 
@@ -223,6 +225,9 @@ fn effects(
             // Friction that rises towards rest says what plain friction would.
             let covered = kind == Kind::Coulomb && c.kinds.iter().any(|k| k.0 == Kind::Stribeck);
             let claim = c.kinds.iter().find(|k| k.0 == kind).filter(|k| !c.unclaimed.contains(&k.0) && !covered);
+            // What the logs say nothing of is no claim.
+            let told = |spread: &Spread| estimates(&joints[j], c, spread, kind).iter().any(|(_, e)| e.determined);
+            let claim = claim.filter(|_| spreads[j].as_ref().is_none_or(told));
             at.extend(claim.map(|k| (j, k.1)));
         }
         let strongest = at.iter().map(|a| a.1).fold(f64::NEG_INFINITY, f64::max);
@@ -248,7 +253,7 @@ fn effects(
                 kind: kind.name().to_owned(),
                 joints: at.iter().map(|&(j, _)| joints[j].name.clone()).collect(),
                 part: if kind.cost() == 0.0 { "calibration" } else { "further" }.to_owned(),
-                confidence: 1.0 / (1.0 + (-strongest).exp()),
+                confidence: THERE / (1.0 + (-strongest).exp()),
                 parameters,
                 indistinguishable_from: ties,
                 shrink: EffectShrink { position: before.map(|_| share(chosen, &at)) },

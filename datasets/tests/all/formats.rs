@@ -130,7 +130,7 @@ fn bags_of_ros_2_as_folders() {
 #[test]
 fn what_is_not_read_is_refused_with_the_mend() {
     refused("ros1.bag", LogErrorKind::UnknownContainer, "rosbags-convert");
-    refused("no_effort.mcap", LogErrorKind::MissingJoint, "needs the torque");
+    refused("no_effort.mcap", LogErrorKind::MissingJoint, "the torque of the drives in N m");
     let options = ReadOptions { topics: vec!["/other".into()], ..ReadOptions::default() };
     let error = read_with("zstd.mcap", &options).unwrap_err().to_string();
     assert!(error.contains("/other") && error.contains("/joint_states"), "{error}");

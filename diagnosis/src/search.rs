@@ -197,7 +197,10 @@ impl Logs<'_> {
     fn needed(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let own = chosen.turned.as_ref().map(|turned| turned.place);
         let rivals = climb::rivals(&chosen.all, &chosen.choice);
-        for kind in climb::kinds(&chosen.all, &chosen.choice.set) {
+        // What is rare is asked first: beside it, something common might seem to do nothing.
+        let mut kinds = climb::kinds(&chosen.all, &chosen.choice.set);
+        kinds.sort_by_key(|kind| (!kind.is_outside(), kind.is_calibration()));
+        for kind in kinds {
             let rival = rivals.iter().find(|rival| rival.without == kind);
             let of_kind = |c: &usize| chosen.all.entries[*c].candidate.kind == kind && Some(*c) != own;
             let set: Vec<usize> = chosen.choice.set.iter().copied().filter(|c| !of_kind(c)).collect();

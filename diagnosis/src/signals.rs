@@ -236,7 +236,7 @@ impl Signals {
         }
         for (j, joint) in model.joints().iter().enumerate().filter(|(_, joint)| joint.friction != 0.0) {
             let sign: Vec<f64> = self.v[j].iter().map(|v| v.signum()).collect();
-            let smeared = self.motion(model, &[]).smeared(&sign, &self.v[j]);
+            let smeared = self.motion(model, &[]).smeared(&sign, &self.v[j], 0.0);
             self.nominal[j].iter_mut().zip(smeared).for_each(|(nominal, sign)| *nominal += joint.friction * sign);
         }
     }

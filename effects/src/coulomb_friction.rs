@@ -43,5 +43,9 @@ impl Law for CoulombFriction {
 /// One column: the sign of the joint's speed. Coefficient: f.
 pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     let sign: Vec<f64> = motion.v[joint].iter().map(|&v| soft_sign(v, motion.standstill[joint])).collect();
-    vec![Column::on(joint, motion.smeared(&sign, &motion.v[joint]), -motion.model.joints()[joint].friction)]
+    vec![Column::on(
+        joint,
+        motion.smeared(&sign, &motion.v[joint], motion.standstill[joint]),
+        -motion.model.joints()[joint].friction,
+    )]
 }

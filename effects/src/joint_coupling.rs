@@ -73,7 +73,7 @@ pub(crate) fn signature(motion: &Motion, [a, b]: [usize; 2], ratio: f64) -> Vec<
     let speed = sum(motion.v);
     let standstill = motion.standstill[a] + ratio.abs() * motion.standstill[b];
     let sign: Vec<f64> = speed.iter().map(|&s| soft_sign(s, standstill)).collect();
-    let smeared = motion.smeared(&sign, &speed);
+    let smeared = motion.smeared(&sign, &speed, standstill);
     [speed, smeared, sum(motion.a)]
         .into_iter()
         .map(|force| {

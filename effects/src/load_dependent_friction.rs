@@ -53,6 +53,6 @@ pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     let noise = motion.effort_noise.get(joint).copied().unwrap_or(0.0);
     let load = |(v, tau): (&f64, &f64)| mean_size(*tau, noise).0 * soft_sign(*v, standstill);
     let force: Vec<f64> = motion.v[joint].iter().zip(&motion.load[joint]).map(load).collect();
-    let column = Column::on(joint, motion.smeared(&force, &motion.v[joint]), 0.0);
+    let column = Column::on(joint, motion.smeared(&force, &motion.v[joint], motion.standstill[joint]), 0.0);
     vec![Column { at_most: SELF_LOCKING, ..column }]
 }

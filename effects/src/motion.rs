@@ -93,7 +93,9 @@ impl Motion<'_> {
 
     /// A force that jumps as a speed changes sign, sample by sample, smoothed like [`Motion::tau`]: what moves the robot
     /// jumps, and what is left of smoothed signals about a jump would be no error of the law.
-    pub fn smeared(&self, force: &[f64], speed: &[f64]) -> Vec<f64> {
+    ///
+    /// Where a joint only comes to rest, below `standstill`, the force is left as it is: what friction holds there is not known.
+    pub fn smeared(&self, force: &[f64], speed: &[f64], standstill: f64) -> Vec<f64> {
         let Some(held) = &self.held else { return force.to_vec() };
         let weights = held.on_signals();
         // The mean over each sample's share of time: it jumps where the speed, linear between samples, is zero.
@@ -104,8 +106,13 @@ impl Motion<'_> {
             force[if early > 0.0 { k - 1 } else { k }] += early * jump;
         }
         let reach = weights.len() / 2;
-        let at = |k: usize| force[k.saturating_sub(reach).min(force.len() - 1)];
-        (0..force.len()).map(|k| weights.iter().enumerate().map(|(i, w)| w * at(k + i)).sum()).collect()
+        let place = |k: usize| k.saturating_sub(reach).min(force.len() - 1);
+        let turns = |k: usize| {
+            let near = &speed[k.saturating_sub(reach)..(k + reach + 1).min(speed.len())];
+            near.iter().any(|v| *v >= standstill) && near.iter().any(|v| *v <= -standstill)
+        };
+        let mean = |k: usize| weights.iter().enumerate().map(|(i, w)| w * force[place(k + i)]).sum();
+        (0..force.len()).map(|k| if turns(k) { mean(k) } else { force[k] }).collect()
     }
 
     /// Number of samples.
@@ -167,13 +174,13 @@ mod tests {
                 pushed: &[],
                 standstill: &[],
             };
-            let smeared = motion.smeared(&force, &speed);
+            let smeared = motion.smeared(&force, &speed, 0.1);
             assert!((smeared[5] + 1.0).abs() < 1e-12 && (smeared[35] - 1.0).abs() < 1e-12);
             assert!(smeared.windows(2).all(|pair| pair[0] <= pair[1] + 1e-12), "no jump, no ringing");
             // The integral of the sign over the 40 shares of time, −0.5 to 39.5.
             let sum: f64 = smeared.iter().sum();
             assert!((sum - ((39.5 - 20.3) - (20.3 + 0.5))).abs() < 1e-9, "{sum}");
-            assert_eq!(Motion { held: None, ..motion }.smeared(&force, &speed), force);
+            assert_eq!(Motion { held: None, ..motion }.smeared(&force, &speed, 0.1), force);
         }
     }
 

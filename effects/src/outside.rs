@@ -72,7 +72,7 @@ pub(crate) fn joint_drag(motion: &Motion, joint: usize, power: f64) -> Vec<Colum
 pub(crate) fn rub(motion: &Motion, joint: usize, place: f64) -> Vec<Column> {
     let rub = |(q, v): (&f64, &f64)| near(*q, place) * soft_sign(*v, motion.standstill[joint]);
     let force: Vec<f64> = motion.q[joint].iter().zip(&motion.v[joint]).map(rub).collect();
-    vec![Column::on(joint, motion.smeared(&force, &motion.v[joint]), 0.0)]
+    vec![Column::on(joint, motion.smeared(&force, &motion.v[joint], motion.standstill[joint]), 0.0)]
 }
 
 /// Torque at one place of a joint's travel, −t Λ(q): a cable, a stop. Coefficient: t, N m (N).

@@ -51,5 +51,9 @@ impl Law for PreslidingFriction {
 
 /// One column: the deflection, over its greatest, of a bristle of stiffness κ = σ/f in 1/rad. Coefficient: f.
 pub(crate) fn signature(motion: &Motion, joint: usize, stiffness: f64) -> Vec<Column> {
-    vec![Column::on(joint, motion.smeared(&bristle(&motion.v[joint], stiffness, motion.dt), &motion.v[joint]), 0.0)]
+    vec![Column::on(
+        joint,
+        motion.smeared(&bristle(&motion.v[joint], stiffness, motion.dt), &motion.v[joint], motion.standstill[joint]),
+        0.0,
+    )]
 }

@@ -60,5 +60,8 @@ pub(crate) fn signature(motion: &Motion, joint: usize, velocity: f64) -> Vec<Col
     let standstill = motion.standstill[joint];
     let sign: Vec<f64> = motion.v[joint].iter().map(|&v| soft_sign(v, standstill)).collect();
     let rise: Vec<f64> = sign.iter().zip(&motion.v[joint]).map(|(s, v)| s * (-(v / velocity).powi(2)).exp()).collect();
-    [sign, rise].into_iter().map(|force| Column::on(joint, motion.smeared(&force, &motion.v[joint]), 0.0)).collect()
+    [sign, rise]
+        .into_iter()
+        .map(|force| Column::on(joint, motion.smeared(&force, &motion.v[joint], motion.standstill[joint]), 0.0))
+        .collect()
 }

@@ -63,5 +63,8 @@ pub(crate) fn signature(motion: &Motion, joint: usize, time_constant: f64) -> Ve
     let sign: Vec<f64> = motion.v[joint].iter().map(|&v| soft_sign(v, standstill)).collect();
     let time = |k: usize| motion.start + k as f64 * motion.dt;
     let cold: Vec<f64> = sign.iter().enumerate().map(|(k, s)| s * (-time(k) / time_constant).exp()).collect();
-    [sign, cold].into_iter().map(|force| Column::on(joint, motion.smeared(&force, &motion.v[joint]), 0.0)).collect()
+    [sign, cold]
+        .into_iter()
+        .map(|force| Column::on(joint, motion.smeared(&force, &motion.v[joint], motion.standstill[joint]), 0.0))
+        .collect()
 }

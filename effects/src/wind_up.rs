@@ -267,7 +267,8 @@ impl Oscillator<'_> {
                     let motor = motor + (drag.speed.get(k + 1).copied().unwrap_or(motor) - motor) * part;
                     let free = motor - drawn - rate;
                     let wet = free / (1.0 + per_torque * drag.viscous);
-                    let hold = (per_torque * drag.dry[k]).abs();
+                    // A link without inertia, or one that a fit in between made no body, has none to hold.
+                    let hold = if inertia > 0.0 { per_torque * drag.dry[k] } else { 0.0 };
                     let link = wet - wet.clamp(-hold, hold);
                     friction = (free - link) / per_torque;
                     rate = motor - drawn - link;

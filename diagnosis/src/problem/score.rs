@@ -159,6 +159,9 @@ impl Problem {
     /// What is left of a joint's rows by a fit, outliers cut, at the noise that an equaliser brings it to: rows of it that
     /// count as one.
     pub fn correlation_of(&self, fit: &Fit, equalizer: Option<&Equalizer>, band: &Band) -> Vec<f64> {
+        if equalizer.is_none() {
+            return self.correlation.clone();
+        }
         let of = |(j, joint): (usize, &JointRows)| {
             let rest = joint.at_noise(band, j, joint.residual(&fit.columns, &fit.theta), equalizer);
             correlation_time(&rest.iter().zip(&joint.robust).map(|(rest, weight)| rest * weight).collect::<Vec<_>>())

@@ -240,7 +240,7 @@ impl Plant {
         for (j, (out, dry)) in
             out.iter_mut().zip(&dry).enumerate().filter(|(_, (_, dry))| dry.iter().any(|f| *f != 0.0))
         {
-            for (k, smeared) in motion.smeared(dry, &motion.v[j]).into_iter().enumerate() {
+            for (k, smeared) in motion.smeared(dry, &motion.v[j], motion.standstill[j]).into_iter().enumerate() {
                 if motion.v[j][k].abs() >= motion.standstill[j] {
                     out[k] += dry[k] - smeared;
                 }

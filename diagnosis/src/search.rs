@@ -21,9 +21,8 @@ const AGAIN: usize = 2;
 /// have been chosen because of it.
 const DOUBTFUL: f64 = 60.0;
 /// Nats that a spring or play must bring beside its rotor: as rare as any kind, on either side of the gear, a knob that the
-/// logs know to a twentieth of its range, and what the best of some hundred tries finds in noise that is brought to one level
-/// by a tenth or so.
-const TURNS: f64 = 3.0 + 0.7 + 3.0 + 24.0;
+/// logs know to a twentieth of its range, and what the best of some hundred tries finds in noise.
+const TURNS: f64 = 3.0 + 0.7 + 3.0 + 9.0;
 
 /// What joints bear at rest beyond friction: `[joint][row]`, N m or N.
 type Borne = Vec<Vec<Option<f64>>>;

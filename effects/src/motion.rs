@@ -108,7 +108,8 @@ impl Motion<'_> {
         let reach = weights.len() / 2;
         let place = |k: usize| k.saturating_sub(reach).min(force.len() - 1);
         let turns = |k: usize| {
-            let near = &speed[k.saturating_sub(reach)..(k + reach + 1).min(speed.len())];
+            // A jump beside the last sample within reach is shared with it.
+            let near = &speed[k.saturating_sub(reach + 1)..(k + reach + 2).min(speed.len())];
             near.iter().any(|v| *v >= standstill) && near.iter().any(|v| *v <= -standstill)
         };
         let mean = |k: usize| weights.iter().enumerate().map(|(i, w)| w * force[place(k + i)]).sum();

@@ -26,6 +26,9 @@ const THERE: f64 = 0.9;
 /// Steps of a fit with a fold left out: it begins where the whole fit ended.
 const FOLD: usize = 8;
 
+/// Simulated positions, rad or m: `[log][joint][sample]`.
+pub type Paths = Vec<Vec<Vec<f64>>>;
+
 /// What a diagnosis gives.
 #[derive(Debug, Clone)]
 pub struct Outcome {
@@ -420,7 +423,7 @@ pub fn evaluate(
     episodes: &[Episode],
     given: &Given,
     corrected: Option<&ServoModel>,
-) -> Result<(Evaluation, Vec<Vec<Vec<f64>>>), ServoModelError> {
+) -> Result<(Evaluation, Paths), ServoModelError> {
     let mut all = joints(model, episodes, given);
     let (nominal, known) = nominal_laws(&all);
     let before = run_free(model, &nominal, &all);

@@ -22,7 +22,7 @@ mod simulate;
 
 pub use arm::simulate_arm;
 pub use choose::{Chosen, Comparison, choose};
-pub use diagnose::{Outcome, diagnose, evaluate};
+pub use diagnose::{Outcome, Paths, diagnose, evaluate};
 pub use fit::{Fit, Ranges, cost, fit};
 pub use given::{Constants, Given, GivenError, Known};
 pub use interval::{Interval, Spread};

@@ -133,7 +133,7 @@ impl Run {
     }
 
     /// Samples of a channel of one joint, where it has a number.
-    pub fn channel<'a>(samples: &'a Option<Vec<Vec<f64>>>, joint: usize) -> Option<&'a [f64]> {
+    pub fn channel(samples: &Option<Vec<Vec<f64>>>, joint: usize) -> Option<&[f64]> {
         let row = samples.as_ref()?.get(joint)?;
         row.iter().any(|x| x.is_finite()).then_some(row.as_slice())
     }

@@ -4,6 +4,8 @@ use crate::estimate::Fit;
 use crate::problem::Problem;
 use crate::refine::Data;
 use crate::regimes::quantile;
+use crate::schema::{Parameter, Quantity};
+use gapscope_dynamics::Model;
 use gapscope_effects::{EffectError, Kind};
 
 /// Part of a fold that a joint must rest for its rests to tell: the blows of other joints would outweigh few of them.
@@ -32,6 +34,27 @@ impl Held {
         let spread = greatest - quantile(&held, WELL_BELOW);
         (held.len() as f64 >= RESTS * rows.len() as f64 && second > noise)
             .then_some(Held { torque: second - noise, doubt: SPREADS * spread + 2.0 * noise })
+    }
+}
+
+impl Fit {
+    /// Whether a Stribeck friction rises towards rest by more than it may be off by, at its printed interval. Any other kind
+    /// does. What does not rise is Coulomb friction.
+    pub fn rises(&self, problem: &Problem, model: &Model, candidate: usize, speeds: &[Vec<usize>]) -> bool {
+        let kind = problem.entries[candidate].candidate.kind;
+        if kind != Kind::StribeckFriction {
+            return true;
+        }
+        let told = self.parameters(problem, model, kind, &[candidate], speeds);
+        let of = |name: &str| match told.get(name) {
+            Some(Parameter::PerJoint(joints)) => joints.values().next(),
+            _ => None,
+        };
+        let (Some(sliding), Some(at_rest)) = (of("coulomb"), of("static")) else { return false };
+        match (&sliding.value, &at_rest.ci95[0]) {
+            (Quantity::Scalar(sliding), Quantity::Scalar(least)) => least > sliding,
+            _ => false,
+        }
     }
 }
 
@@ -67,5 +90,25 @@ impl Data<'_> {
             problem.entries[c].held = held;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::estimate::speeds;
+    use crate::support::{fitted_as, torque};
+    use gapscope_effects::{Candidate, Kind};
+
+    #[test]
+    fn friction_rises_towards_rest_where_it_does_so_beyond_doubt() {
+        let sticking = Candidate { shape: 0.2, ..Candidate::new(Kind::StribeckFriction, vec![0]) };
+        let rises = |law: fn(f64) -> f64| {
+            let (signals, band, problem, fit) = fitted_as(sticking.clone(), torque(law));
+            let model = gapscope_dynamics::robots::model("double_pendulum").unwrap().unwrap().model;
+            fit.rises(&problem, &model, 0, &speeds(&signals, &band, 2))
+        };
+        assert!(!rises(|v| 0.4 * v.signum()), "it slides");
+        assert!(!rises(|v| (0.4 - 0.2 * (-(v / 0.2).powi(2)).exp()) * v.signum()), "it falls");
+        assert!(rises(|v| (0.4 + 0.4 * (-(v / 0.2).powi(2)).exp()) * v.signum()), "it sticks");
     }
 }

@@ -65,8 +65,9 @@ const STIFFEST: f64 = 20.0;
 const LIGHTEST: f64 = 0.05;
 /// So many blocks of time must show something at all: a joint that its load holds on one side may cross its play once or twice.
 const LEAST_TELLING: usize = 2;
-/// Standard errors of a gap up to which it may be none: half of a 95 % interval.
-const NO_PLAY: f64 = 1.96;
+/// Standard errors from a rigid drive up to which the drive may be rigid: what the best of the hundred tries at each joint
+/// finds in noise, and what [`crate::search`] asks of a drive before any log is seen, k²/2 = 13 nats.
+const RIGID: f64 = 5.0;
 /// Gap, rad or m, that a drive would be mended for before anybody logged it.
 const WIDEST: f64 = 0.15;
 const SEED: u64 = 5;
@@ -246,9 +247,9 @@ impl<'a> Study<'a> {
                 // Its own filter is another now.
                 let (drive, rotor) = if self.through { self.turn(drive, rotor) } else { (drive, rotor) };
                 let measure = self.measure(&drive, rotor);
-                // Play that may be none is another account's, and so is a gap that no gear has.
-                let play = NO_PLAY * self.error(&drive, rotor)..WIDEST;
-                if kind == Kind::Backlash && !play.contains(&drive.shape) {
+                // A drive that may be rigid is another account's, and so is a gap that no gear has.
+                let drive = Candidate { knob_error: self.error(&drive, rotor), ..drive };
+                if drive.errors_from_rigid() < RIGID || (kind == Kind::Backlash && drive.shape > WIDEST) {
                     continue;
                 }
                 if best.as_ref().is_none_or(|(least, ..)| measure < *least) {
@@ -262,8 +263,7 @@ impl<'a> Study<'a> {
         // At the edge of what a drive can be, it stands in for something else.
         let possible =
             self.shows(rotor) && (drive.kind != Kind::JointElasticity || (SOFTEST..STIFFEST).contains(&drive.shape));
-        let knob_error = self.error(&drive, rotor);
-        possible.then_some(Account { drive: Candidate { knob_error, ..drive }, beyond })
+        possible.then_some(Account { drive, beyond })
     }
 
     /// Whether a rotor is heavy enough for its drive to show. A link without inertia about its joint has no drive that turns

@@ -74,7 +74,9 @@ impl Logs<'_> {
         // Part of the difference that the first leaves: 0 where it is right, 1 where the second is.
         let part = left / between;
         let error = sums.iter().map(|(l, b)| (l - part * b).powi(2)).sum::<f64>().sqrt() / between.abs();
-        let odds = (2.0 * part - 1.0) / (2.0 * error.hypot(INEXACT).powi(2));
+        // What lies beyond both laws is something else, and so may be what lies between them.
+        let beyond = part - part.clamp(0.0, 1.0);
+        let odds = (2.0 * part - 1.0) / (2.0 * error.hypot(INEXACT).hypot(beyond).powi(2));
         1.0 / (1.0 + (-odds).exp())
     }
 }

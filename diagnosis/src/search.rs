@@ -3,7 +3,7 @@
 use crate::climb::{self, Choice, Competition, LATE, Rival};
 use crate::corrected::residual;
 use crate::diagnose::{Logs, Progress};
-use crate::estimate::Fit;
+use crate::estimate::{Fit, speeds};
 use crate::floor::noise_floor;
 use crate::problem::{AT_REST, Entry, Problem, Term};
 use crate::refine::Data;
@@ -153,13 +153,36 @@ impl Logs<'_> {
                 .collect();
             shapes.get(shapes.len() / 2).copied().unwrap_or(c)
         };
-        let slides = |c: usize| of(c).kind == Kind::CoulombFriction && bears(c);
-        let mut set: Vec<usize> = chosen.choice.set.iter().map(|&c| if slides(c) { sticks(c) } else { c }).collect();
-        set.sort_unstable();
+        // Pairs of what slides and what sticks.
+        let pairs: Vec<(usize, usize)> = (chosen.choice.set.iter())
+            .filter(|&&c| of(c).kind == Kind::CoulombFriction && bears(c))
+            .map(|&c| (c, sticks(c)))
+            .collect();
+        let with = |pairs: &[(usize, usize)]| {
+            let swapped = |c: usize| pairs.iter().find(|(slides, _)| *slides == c).map_or(c, |(_, sticks)| *sticks);
+            let mut set: Vec<usize> = chosen.choice.set.iter().map(|&c| swapped(c)).collect();
+            set.sort_unstable();
+            set
+        };
+        let refine = |set: &[usize]| self.data(&chosen.noise).refine(&with_drive(&chosen.all, set, &chosen.turned));
+        let mut set = with(&pairs);
         if set == chosen.choice.set {
             return Ok(chosen);
         }
-        let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
+        let (mut exact, mut fit) = refine(&set)?;
+        // A friction that does not rise beyond doubt slides.
+        let speeds = speeds(&self.signals, &self.band, self.model.dof());
+        let rises = |&&(_, sticks): &&(usize, usize)| {
+            set.iter().position(|&c| c == sticks).is_some_and(|i| fit.rises(&exact, self.model, i, &speeds))
+        };
+        let rising: Vec<(usize, usize)> = pairs.iter().filter(rises).copied().collect();
+        if rising.is_empty() {
+            return Ok(chosen);
+        }
+        if rising.len() < pairs.len() {
+            set = with(&rising);
+            (exact, fit) = refine(&set)?;
+        }
         let sticking = chosen.with(Choice { set }, exact, fit);
         Ok(if sticking.odds_against(&chosen, self)? > 0.0 { sticking } else { chosen })
     }
@@ -224,8 +247,20 @@ impl Logs<'_> {
                 let next = if next.turned.is_none() { self.drive(next, progress)? } else { next };
                 let over = chosen.odds_against(&next, self)?;
                 if over < 0.0 {
+                    // What lost may still stand beside what won.
+                    let mut set: Vec<usize> = chosen.choice.set.iter().copied().filter(of_kind).collect();
+                    set.extend(&next.choice.set);
+                    set.sort_unstable();
+                    set.dedup();
+                    let (exact, fit) = self.data(&next.noise).refine(&with_drive(&next.all, &set, &next.turned))?;
+                    let both = next.with(Choice { set }, exact, fit);
+                    let beside = both.odds_against(&next, self)?;
                     let closed = std::mem::take(&mut chosen.all.closed);
-                    chosen = Chosen { tried: chosen.tried, needed: chosen.needed, ..next };
+                    let (tried, mut needed) = (std::mem::take(&mut chosen.tried), std::mem::take(&mut chosen.needed));
+                    if beside > 0.0 {
+                        needed.push((kind, beside));
+                    }
+                    chosen = Chosen { tried, needed, ..if beside > 0.0 { both } else { next } };
                     chosen.all.closed = closed;
                     continue;
                 }

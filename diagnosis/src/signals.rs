@@ -24,6 +24,8 @@ const STANDSTILL_FRACTION: f64 = 0.03;
 const STANDSTILL_NOISE: f64 = 4.0;
 /// Rate of the smoothed signals, Hz, at most.
 const SIGNAL_RATE: f64 = 500.0;
+/// Time that the begin and the end of a push may be off by, s: half a row of the band.
+const EDGE: f64 = 0.02;
 
 /// One episode's signals. Joint-major: `q[j][k]`.
 #[derive(Debug, Clone)]
@@ -155,7 +157,13 @@ impl Signals {
         (0..taken.len()).map(|k| (at(k + 1) - at(k.saturating_sub(1))) / (2.0 * self.dt)).collect()
     }
 
-    /// The samples at which a joint slides. A slow log is smoothed so widely that its effort before and after a reversal runs
+    /// Whether something outside may be about to push or to let go at sample `k`.
+    fn pushed_in_part(&self, k: usize) -> bool {
+        let time = self.time(k);
+        self.pushed.iter().flatten().any(|edge| (time - edge).abs() < EDGE)
+    }
+
+    /// The samples at which a joint slides and nothing outside begins or ends to push. A slow log is smoothed so widely that its effort before and after a reversal runs
     /// together: there the sign of the speed says nothing for as long.
     pub fn slides(&self, joint: usize, standstill: f64) -> Vec<bool> {
         let stands: Vec<bool> = self.v[joint].iter().map(|v| v.abs() < standstill).collect();
@@ -163,7 +171,7 @@ impl Signals {
         // The sample beside a rest shares its differences with it.
         let reach = (wide / self.dt).round().max(1.0) as usize;
         let near = |k: usize| stands[k.saturating_sub(reach)..(k + reach + 1).min(stands.len())].iter().any(|s| *s);
-        (0..stands.len()).map(|k| !near(k)).collect()
+        (0..stands.len()).map(|k| !near(k) && !self.pushed_in_part(k)).collect()
     }
 
     /// Number of signals.

@@ -181,6 +181,13 @@ impl Candidate {
         matches!(self.kind, Kind::JointElasticity | Kind::Backlash)
     }
 
+    /// Standard errors of its knob by which a drive that turns on its own is off a rigid one: of its gap, or of the compliance,
+    /// which goes with the square of its period.
+    pub fn errors_from_rigid(&self) -> f64 {
+        let power = if self.kind == Kind::JointElasticity { 2.0 } else { 1.0 };
+        self.shape / (power * self.knob_error)
+    }
+
     /// Whether the law filters what was measured, so that its noise comes out larger or smaller.
     pub fn filters(&self) -> bool {
         let effort = [Kind::TorqueGainError, Kind::ActuationDelay, Kind::ActuatorLag];

@@ -153,8 +153,9 @@ impl Problem {
                 let fixed: f64 = (0..m).filter_map(|j| held[j].map(|h| gram[(free[a], j)] * h)).sum();
                 moment[free[a]] - fixed
             });
-            let Some(cholesky) = Factor::new(&sub) else { return vec![0.0; m] };
-            let solution = cholesky.solve(&right);
+            let solution = Factor::new(&sub).map(|factor| factor.solve(&right));
+            // Columns that diverged determine nothing.
+            let Some(solution) = solution.filter(|x| x.iter().all(|x| x.is_finite())) else { return vec![0.0; m] };
             for i in 0..m {
                 if let Some(value) = held[i] {
                     theta[i] = value;
@@ -200,20 +201,10 @@ impl Problem {
         DMatrix::from_fn(left.len(), right.len(), |i, j| self.total.gram[(left[i], right[j])])
     }
 
-    /// What a fit of all candidates, deaf to what stands far out, leaves at each row: `[joint][row]`; 0 where a row is out.
-    pub fn robust_rest(&self, rows: usize) -> Vec<Vec<f64>> {
+    /// Coefficients of all columns, deaf to what stands far out.
+    pub fn robust(&self) -> Vec<f64> {
         let all: Vec<usize> = (0..self.bounds.len()).collect();
-        let theta = self.solve_unbounded(&all, &self.total);
-        self.joints
-            .iter()
-            .map(|joint| {
-                let mut rest = vec![0.0; rows];
-                for (&row, r) in joint.rows.iter().zip(joint.residual(&all, &theta)) {
-                    rest[row] = r;
-                }
-                rest
-            })
-            .collect()
+        self.solve_unbounded(&all, &self.total)
     }
 }
 
@@ -221,6 +212,13 @@ impl Problem {
 mod tests {
     use crate::support::{fitted, torque};
     use gapscope_effects::Kind;
+
+    /// A law whose prediction diverged leaves no number, and no body to look for.
+    #[test]
+    fn columns_that_diverged_determine_nothing() {
+        let (.., fit) = fitted(Kind::LinkInertiaError, |s| s.tau[0].iter_mut().for_each(|tau| *tau = f64::NAN));
+        assert!(fit.theta.iter().all(|theta| *theta == 0.0), "{:?}", fit.theta);
+    }
 
     /// No log of a planar arm shows the mass of its first link: the link keeps it, with what is plausible for an interval.
     #[test]

@@ -2,7 +2,7 @@
 
 use super::{Direction, Plant};
 use crate::Motion;
-use crate::filter::{bristle, early, first_derivative, first_order, late};
+use crate::filter::{bristle, early, first_order, late};
 use crate::motion::mean_size;
 use crate::wind_up::{Coupling, Drag, JointRun, Oscillator, WindUp, inertia_about, slope_about};
 
@@ -52,22 +52,19 @@ impl Plant {
     /// behind it as its inertia and the joint have it, drawn to what the motor is seen to pass on, and every joint takes the torque
     /// of that motion.
     ///
-    /// What is left is told at the effort that was logged. Behind a lag, or between two samples, its noise would be smaller
-    /// than it is, and a plant that is late would seem to explain some of it.
+    /// Behind a delay what is left is told at the effort that was logged: between two samples its noise would be smaller than
+    /// it is. Behind a lag it is told where the effort acts: the other way round, the torque that the motion takes and its
+    /// rate, noise of the position would grow with the frequency and pull the time constant to zero.
     pub fn residuals(&mut self, motion: &Motion) -> Vec<Vec<f64>> {
         let limited = self.limited(motion);
         let acting = self.late(&limited, motion.dt);
         let mut rest = self.residuals_where_it_acts(motion, &acting);
         let (delay, lag) = (self.actuation.delay, self.actuation.lag);
-        if delay > 0.0 || lag > 0.0 {
+        if delay > 0.0 && lag == 0.0 {
             for ((rest, acting), logged) in rest.iter_mut().zip(&acting).zip(&limited) {
                 let taken: Vec<f64> = acting.iter().zip(&*rest).map(|(acting, rest)| acting - rest).collect();
-                let rate = first_derivative(&taken, motion.dt);
-                let needed: Vec<f64> = taken.iter().zip(rate).map(|(taken, rate)| taken + lag * rate).collect();
-                let needed = early(&needed, delay, motion.dt);
-                rest.iter_mut()
-                    .zip(logged.iter().zip(needed))
-                    .for_each(|(rest, (logged, needed))| *rest = logged - needed);
+                let needed = early(&taken, delay, motion.dt);
+                *rest = logged.iter().zip(needed).map(|(logged, needed)| logged - needed).collect();
             }
         }
         rest

@@ -131,7 +131,7 @@ fn long_sentences(text: &str) -> Vec<String> {
         let mut sentence: Vec<&str> = Vec::new();
         for word in text.split_whitespace() {
             sentence.push(word);
-            if word.ends_with(['.', '!', '?']) {
+            if word.trim_end_matches(['*', '”', ')']).ends_with(['.', '!', '?']) {
                 long.extend(too_long(&sentence));
                 sentence.clear();
             }

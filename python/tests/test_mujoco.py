@@ -67,7 +67,7 @@ def test_urdf_and_ledger(case):
     assert exported.text == case.diagnosis.to_urdf() and "<robot" in exported.text
     assert exported.ledger["shrink"] > 0.9 and "viscous_friction: written" in repr(exported)
     assert "damping=" in exported.text
-    with pytest.raises(gapscope.Error, match="there is no target 'usd'"):
+    with pytest.raises(gapscope.Error, match='there is no target "usd"'):
         case.diagnosis.export("usd")
 
 

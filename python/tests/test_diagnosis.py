@@ -55,7 +55,8 @@ def test_frames(case, library):
 def test_it_finds_what_is_there_and_says_so_in_three_lines(case):
     diagnosis = case.diagnosis
     assert {effect.kind for effect in diagnosis.effects} == {"coulomb_friction", "viscous_friction"}
-    found = diagnosis.effects[0].parameters["coulomb"]["joint1"]
+    (coulomb,) = (effect for effect in diagnosis.effects if effect.kind == "coulomb_friction")
+    found = coulomb.parameters["coulomb"]["joint1"]
     assert abs(found["value"] - 0.3) < 0.02 and found["unit"] == "N m"
     lines = repr(diagnosis).split("\n")
     assert len(lines) == 3 and lines[0].startswith("EXPLAINED  double_pendulum: It comes from ")

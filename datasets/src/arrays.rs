@@ -101,6 +101,19 @@ pub(crate) fn recording(arrays: &[Array], rate: Option<f64>, request: &Request) 
     Ok(recording)
 }
 
+/// The run that arrays hold as columns named natively (`position.<joint>`), or else as whole quantities.
+pub(crate) fn columns_or_whole(held: Vec<Array>, request: &Request) -> Result<Recording, LogError> {
+    let native = |array: &Array| {
+        array.name.split_once('.').is_some_and(|(channel, _)| Channel::from_name(channel).is_some())
+            && array.shape.len() == 1
+    };
+    if !held.iter().any(native) {
+        return recording(&held, None, request);
+    }
+    let flat = held.into_iter().filter(|array| array.shape.len() == 1 && array.texts.is_empty());
+    Ok(Recording { columns: flat.map(|array| (array.name, array.values)).collect(), ..Recording::default() })
+}
+
 /// An error where the arrays that no log can do without are missing, and no map says where they are.
 fn require(channels: &[Channel], arrays: &[Array], request: &Request) -> Result<(), LogError> {
     if !request.options.map.is_empty() {

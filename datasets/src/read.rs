@@ -80,7 +80,7 @@ fn read_file(path: &Path, name: &str, request: &Request) -> Result<(Vec<Episode>
 }
 
 /// Takes an episode in, unless the same samples are there already.
-fn add(part: Episode, episodes: &mut Vec<Episode>, findings: &mut Vec<Finding>) {
+pub(crate) fn add(part: Episode, episodes: &mut Vec<Episode>, findings: &mut Vec<Finding>) {
     match episodes.iter().find(|earlier| earlier.time == part.time && earlier.position == part.position) {
         Some(earlier) => findings.push(Finding::new(
             &part.name,

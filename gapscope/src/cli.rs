@@ -88,6 +88,9 @@ pub struct Input {
     /// Take the logs as they are, where a wrong unit, sign, order, zero or clock was found
     #[arg(long)]
     pub as_logged: bool,
+    /// Logs in memory, in the place of files; `logs` then holds their names
+    #[arg(skip)]
+    pub arrays: Vec<gapscope_datasets::Arrays>,
 }
 
 /// Arguments of `diagnose`.

@@ -1,7 +1,7 @@
 //! `gapscope evaluate`.
 
 use crate::cli::Evaluate;
-use crate::input::{load_any, strangeness};
+use crate::input::{load_any, strangeness, warn};
 use crate::{output, servo, summary};
 use anyhow::{Context, Result, bail};
 use gapscope_diagnosis::{Corrected, Predictions, evaluate};
@@ -16,9 +16,41 @@ pub fn run(args: &Evaluate) -> Result<String> {
     if let Some(file) = args.predictions.as_ref().filter(|f| f.exists() && !args.force) {
         bail!("{} exists already; choose another name, or allow it to be replaced with --force", file.display());
     }
+    let evaluated = evaluated(args)?;
+    warn(&evaluated.notes);
+    if let Some(file) = &args.predictions {
+        output::write(file, &evaluated.table)?;
+    }
+    Ok(if args.json { evaluated.json } else { evaluated.text })
+}
+
+/// An evaluation, in the forms in which it is given.
+#[derive(Debug)]
+pub struct Evaluated {
+    /// One JSON object, schema `gapscope.evaluation/1`.
+    pub json: String,
+    /// The same in some lines.
+    pub text: String,
+    /// What is wrong or odd about logs, robot and corrected model.
+    pub notes: Vec<String>,
+    /// Torque over time, a log each; empty for a servo arm.
+    pub predictions: Vec<Predictions>,
+    /// What goes into a predictions file; empty where none is asked for.
+    pub table: String,
+}
+
+/// Evaluates and writes nothing.
+///
+/// # Errors
+/// Bad input, or a corrected model that cannot be read or is that of another robot.
+pub fn evaluated(args: &Evaluate) -> Result<Evaluated> {
     let mut loaded = load_any(&args.input)?;
+    let wanted = |table: &dyn Fn() -> String| args.predictions.as_ref().map_or_else(String::new, |_| table());
     if servo::lacks_effort(&loaded) {
-        return servo::evaluate(args, &loaded);
+        let (evaluation, paths) = servo::evaluated(args, &loaded)?;
+        let table = wanted(&|| servo::table(&loaded, &paths));
+        let (json, text) = (serde_json::to_string(&evaluation)?, servo::evaluation_summary(&evaluation));
+        return Ok(Evaluated { json, text, notes: Vec::new(), predictions: Vec::new(), table });
     }
     let corrected = match &args.with {
         Some(file) => {
@@ -30,12 +62,10 @@ pub fn run(args: &Evaluate) -> Result<String> {
     };
     let made_from = corrected.as_ref().and_then(|corrected| corrected.made_from.as_ref());
     loaded.findings.splice(0..0, strangeness(made_from, &args.input, &loaded.origin));
-    loaded.warn();
     let (evaluation, predictions) = evaluate(&loaded.model, &loaded.episodes, corrected.as_ref())?;
-    if let Some(file) = &args.predictions {
-        output::write(file, &table(&loaded.model, &predictions))?;
-    }
-    Ok(if args.json { serde_json::to_string(&evaluation)? } else { summary::evaluation_summary(&evaluation) })
+    let table = wanted(&|| table(&loaded.model, &predictions));
+    let (json, text) = (serde_json::to_string(&evaluation)?, summary::evaluation_summary(&evaluation));
+    Ok(Evaluated { json, text, notes: loaded.notes(), predictions, table })
 }
 
 /// One row for each compared instant: log, time, then measured, nominal and corrected torque of each joint.

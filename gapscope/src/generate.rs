@@ -34,24 +34,7 @@ struct Truth<'a> {
 /// # Errors
 /// A robot or effects that cannot be read or do not go together, a number that cannot be, files that exist.
 pub fn run(args: &Generate) -> Result<String> {
-    let (urdf, model) = robot(args)?;
-    let mut effects = match &args.effects {
-        Some(file) => read_effects(file)?,
-        None => Vec::new(),
-    };
-    if let Some(scale) = args.perturb.filter(|scale| !(0.0..=10.0).contains(scale)) {
-        bail!("--perturb is {scale}, but must be between 0 and 10");
-    }
-    let perturbation = args.perturb.map(Perturbation::scaled);
-    if let Some(perturbation) = perturbation {
-        effects.extend(perturbation.draw(&model, args.seed));
-    }
-    let mut recipe = recipe(args);
-    let trajectory = args.trajectory.as_deref().map(|file| read_trajectory(file, &model)).transpose()?;
-    if let Some(trajectory) = &trajectory {
-        recipe.seconds = trajectory.duration();
-    }
-    let reference = trajectory.as_ref().map(Reference::along);
+    let Plan { urdf, model, effects, perturbation, recipe, reference } = plan(args)?;
     let out = match &args.out {
         Some(out) => out.clone(),
         None => output::new_folder(Path::new(""), "gapscope-logs")?,
@@ -83,6 +66,51 @@ pub fn run(args: &Generate) -> Result<String> {
         Truth { schema: TRUTH_SCHEMA, robot, seed, episodes, recipe, trajectory, perturbation, effects: &effects };
     output::write(&truth_file, &(serde_json::to_string_pretty(&truth)? + "\n"))?;
     Ok(told(&model, &effects, args, &recipe, &out))
+}
+
+/// What is to be simulated.
+struct Plan {
+    urdf: String,
+    model: Model,
+    effects: Vec<Effect>,
+    perturbation: Option<Perturbation>,
+    recipe: Recipe,
+    /// The motion that is followed instead of one of the recipe.
+    reference: Option<Reference>,
+}
+
+/// Simulates and writes nothing: the robot's URDF, the effects that its logs hold, and the logs.
+///
+/// # Errors
+/// As [`run`], but for files.
+pub fn simulated(args: &Generate) -> Result<(String, Vec<Effect>, Vec<Episode>)> {
+    let Plan { urdf, model, effects, recipe, reference, .. } = plan(args)?;
+    let numbers: Vec<u64> = (0..args.episodes).collect();
+    let one = |&i: &u64| episode(&model, &effects, args.seed, i, &recipe, reference.as_ref());
+    let episodes = numbers.par_iter().map(one).collect::<Result<_>>()?;
+    Ok((urdf, effects, episodes))
+}
+
+fn plan(args: &Generate) -> Result<Plan> {
+    let (urdf, model) = robot(args)?;
+    let mut effects = match &args.effects {
+        Some(file) => read_effects(file)?,
+        None => Vec::new(),
+    };
+    if let Some(scale) = args.perturb.filter(|scale| !(0.0..=10.0).contains(scale)) {
+        bail!("--perturb is {scale}, but must be between 0 and 10");
+    }
+    let perturbation = args.perturb.map(Perturbation::scaled);
+    if let Some(perturbation) = perturbation {
+        effects.extend(perturbation.draw(&model, args.seed));
+    }
+    let mut recipe = recipe(args);
+    let trajectory = args.trajectory.as_deref().map(|file| read_trajectory(file, &model)).transpose()?;
+    if let Some(trajectory) = &trajectory {
+        recipe.seconds = trajectory.duration();
+    }
+    let reference = trajectory.as_ref().map(Reference::along);
+    Ok(Plan { urdf, model, effects, perturbation, recipe, reference })
 }
 
 /// The robot's URDF and model: a file's, or a built-in one's where there is no file of the name.

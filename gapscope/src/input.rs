@@ -4,8 +4,8 @@ use crate::cli::Input;
 use crate::robot;
 use anyhow::{Context, Result, bail};
 use gapscope_datasets::{
-    Calibration, ColumnMap, Doubt, Episode, Fault, Faults, LONGEST_STEP, ReadOptions, check_logs, digest, find_faults,
-    mend, read_logs,
+    Calibration, ColumnMap, Doubt, Episode, Fault, Faults, LONGEST_STEP, LogError, ReadOptions, check_logs, digest,
+    find_faults, mend, read_arrays, read_logs,
 };
 use gapscope_diagnosis::Origin;
 use gapscope_dynamics::{Finding, Model};
@@ -34,13 +34,23 @@ impl Loaded {
         faults.chain(self.doubts.iter().map(|doubt| format!("In doubt: {}", doubt.question))).collect()
     }
 
+    /// What is wrong with the logs and what was odd, in lines free of control characters.
+    pub fn notes(&self) -> Vec<String> {
+        let clean = |line: &String| line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        self.warnings().iter().chain(&self.findings).map(clean).collect()
+    }
+
     /// Says on standard error what is wrong with the logs, for commands that have no place for it in their answer.
     pub fn warn(&self) {
-        let mut out = std::io::stderr();
-        for line in self.warnings().iter().chain(&self.findings) {
-            let clean: String = line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-            let _ = writeln!(out, "note: {clean}");
-        }
+        warn(&self.notes());
+    }
+}
+
+/// Says notes on standard error.
+pub fn warn(notes: &[String]) {
+    let mut out = std::io::stderr();
+    for note in notes {
+        let _ = writeln!(out, "note: {note}");
     }
 }
 
@@ -81,7 +91,7 @@ fn load_with(input: &Input, options: ReadOptions) -> Result<Loaded> {
     loop {
         let robot = description.model(&input.robot, &locked)?;
         let joints: Vec<String> = robot.model.joints().iter().map(|j| j.name.clone()).collect();
-        let (episodes, notes) = match read_logs(&input.logs, &joints, &options) {
+        let (episodes, notes) = match read(input, &joints, &options) {
             // Each round holds joints more, so that it ends.
             Err(error) if !error.absent.is_empty() => {
                 let message = "the logs say nothing of it: held still at position zero";
@@ -94,6 +104,21 @@ fn load_with(input: &Input, options: ReadOptions) -> Result<Loaded> {
         said.extend(notes);
         said.extend(robot.findings);
         return checked(input, robot.model, episodes, said);
+    }
+}
+
+/// The logs, from files or from memory.
+///
+/// # Errors
+/// The first log that breaks a rule.
+pub(crate) fn read(
+    input: &Input,
+    joints: &[String],
+    options: &ReadOptions,
+) -> Result<(Vec<Episode>, Vec<Finding>), LogError> {
+    match input.arrays.as_slice() {
+        [] => read_logs(&input.logs, joints, options),
+        arrays => read_arrays(arrays, joints, options),
     }
 }
 
@@ -154,7 +179,13 @@ pub fn options(input: &Input) -> Result<ReadOptions> {
 /// Digests of the robot description and the logs.
 fn origin(input: &Input) -> Result<Origin> {
     let of = |path: &std::path::PathBuf| digest(path).with_context(|| format!("cannot read {}", path.display()));
-    Ok(Origin { robot: of(&input.robot)?, logs: input.logs.iter().map(of).collect::<Result<_>>()? })
+    let logs = if input.arrays.is_empty() {
+        input.logs.iter().map(of).collect::<Result<_>>()?
+    } else {
+        // Without a file there is nothing to know the log by again.
+        vec![String::new(); input.arrays.len()]
+    };
+    Ok(Origin { robot: of(&input.robot)?, logs })
 }
 
 /// What is to be said where a correction is put on logs: another robot than its own, or the logs that it was fitted on.

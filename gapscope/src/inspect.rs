@@ -1,25 +1,30 @@
 //! `gapscope inspect`: what logs are like, what is wrong with them, and what they determine.
 
 use crate::cli::{Input, Inspect};
-use crate::input::{fault_line, load, options};
+use crate::input::{fault_line, load, options, read};
 use crate::report::terminal::{column, fill, pad};
 use crate::report::{count, figure, percent, plain};
 use anyhow::{Context, Result};
-use gapscope_datasets::{Doubt, Fault, LogTraits, determined, inspect, joints_of, read_logs};
+use gapscope_datasets::{Doubt, Fault, LogTraits, determined, inspect, joints_of};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// What `--json` prints, schema `gapscope.inspection/1`.
 #[derive(Debug, Serialize)]
-struct Inspection {
-    schema: &'static str,
-    logs: Vec<LogTraits>,
-    faults: Vec<Fault>,
-    doubts: Vec<Doubt>,
-    findings: Vec<String>,
+pub struct Inspection {
+    /// Its name.
+    pub schema: &'static str,
+    /// What each log is like.
+    pub logs: Vec<LogTraits>,
+    /// What is wrong with the logs beyond doubt.
+    pub faults: Vec<Fault>,
+    /// What may be wrong with them.
+    pub doubts: Vec<Doubt>,
+    /// What was odd on the way.
+    pub findings: Vec<String>,
     /// Which parameters the logs determine, by joint; empty without a robot.
-    determined: BTreeMap<String, Vec<&'static str>>,
+    pub determined: BTreeMap<String, Vec<&'static str>>,
 }
 
 /// Inspects; returns what to print.
@@ -27,12 +32,6 @@ struct Inspection {
 /// # Errors
 /// Bad input.
 pub fn run(args: &Inspect) -> Result<String> {
-    let inspection = inspected(args)?;
-    Ok(if args.json { serde_json::to_string(&inspection)? } else { text(&inspection) })
-}
-
-fn inspected(args: &Inspect) -> Result<Inspection> {
-    let schema = "gapscope.inspection/1";
     let input = Input {
         robot: args.model.clone().unwrap_or_default(),
         logs: args.logs.clone(),
@@ -43,14 +42,27 @@ fn inspected(args: &Inspect) -> Result<Inspection> {
         lock: args.lock.clone(),
         ..Input::default()
     };
-    if args.model.is_none() {
-        let joints = joints_of(args.logs.first().context("no log is given")?)?;
-        let (episodes, notes) = read_logs(&args.logs, &joints, &options(&input)?)?;
+    let inspection = inspected(&input)?;
+    Ok(if args.json { serde_json::to_string(&inspection)? } else { text(&inspection) })
+}
+
+/// What the logs are like; without a robot where its path is empty.
+///
+/// # Errors
+/// Bad input.
+pub fn inspected(input: &Input) -> Result<Inspection> {
+    let schema = "gapscope.inspection/1";
+    if input.robot.as_os_str().is_empty() {
+        let joints = match input.arrays.first() {
+            Some(first) => first.joints(),
+            None => joints_of(input.logs.first().context("no log is given")?)?,
+        };
+        let (episodes, notes) = read(input, &joints, &options(input)?)?;
         let findings = notes.iter().map(ToString::to_string).collect();
         let logs = inspect(&episodes);
         return Ok(Inspection { schema, logs, faults: vec![], doubts: vec![], findings, determined: BTreeMap::new() });
     }
-    let loaded = load(&input)?;
+    let loaded = load(input)?;
     let names = loaded.model.joints().iter().map(|joint| joint.name.clone());
     Ok(Inspection {
         schema,
@@ -62,7 +74,8 @@ fn inspected(args: &Inspect) -> Result<Inspection> {
     })
 }
 
-fn text(inspection: &Inspection) -> String {
+/// The inspection in lines.
+pub fn text(inspection: &Inspection) -> String {
     let mut text = String::new();
     for fault in &inspection.faults {
         let _ = writeln!(text, "Fault: {}", fault_line(fault));

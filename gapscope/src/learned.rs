@@ -29,6 +29,31 @@ struct Setting {
 /// Files that are missing or hold something else, another kind, other joints than the robot's, or a network of another
 /// shape; the text names file, cause and mend.
 pub fn load(path: &Path, kind: Kind, robot: &Model) -> Result<Contender> {
+    if kind == Kind::Residual {
+        return Ok(Contender::with_own_step("hybrid", residual(path, robot)?));
+    }
+    let Read { network, setting, place } = read(path, kind, robot)?;
+    let pure = Pure::new(setting.joints.len(), setting.dt, network).with_context(|| place)?;
+    Ok(Contender::with_own_step("pure", pure))
+}
+
+/// The residual in such a folder, on the robot's own model.
+///
+/// # Errors
+/// As those of [`load`].
+pub fn residual(path: &Path, robot: &Model) -> Result<Hybrid<Plant, Net<f32>>> {
+    let Read { network, setting, place } = read(path, Kind::Residual, robot)?;
+    Hybrid::new(Plant::nominal(robot, setting.dt), network, setting.on.unwrap_or_default()).with_context(|| place)
+}
+
+/// A network with what it was trained for, and what to say where the two do not go together.
+struct Read {
+    network: Net<f32>,
+    setting: Setting,
+    place: String,
+}
+
+fn read(path: &Path, kind: Kind, robot: &Model) -> Result<Read> {
     let weights = if path.is_dir() { path.join("weights.safetensors") } else { path.to_owned() };
     let network = network(&weights)?;
     let record = weights.with_file_name("training.json");
@@ -51,14 +76,8 @@ pub fn load(path: &Path, kind: Kind, robot: &Model) -> Result<Contender> {
     );
     let dt = setting.dt;
     ensure!(dt.is_finite() && dt > 0.0, "{}: its step dt is {dt}, expected seconds above zero", record.display());
-    let fits = || format!("{} does not fit {}", weights.display(), record.display());
-    Ok(match kind {
-        Kind::Residual => {
-            let hybrid = Hybrid::new(Plant::nominal(robot, dt), network, setting.on.unwrap_or_default());
-            Contender::with_own_step("hybrid", hybrid.with_context(fits)?)
-        }
-        Kind::Pure => Contender::with_own_step("pure", Pure::new(joints.len(), dt, network).with_context(fits)?),
-    })
+    let place = format!("{} does not fit {}", weights.display(), record.display());
+    Ok(Read { network, setting, place })
 }
 
 fn network(weights: &Path) -> Result<Net<f32>> {

@@ -1,45 +1,12 @@
 //! The `gapscope` command: exit status 0 on any verdict, 1 on bad input, 2 on wrong usage.
-#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
-
-mod cli;
-mod demo;
-mod diagnose;
-mod evaluate;
-mod export;
-mod generate;
-mod input;
-mod inspect;
-mod learned;
-mod output;
-mod picture;
-mod report;
-mod robot;
-mod rollout;
-mod servo;
-mod study;
-mod summary;
-mod train;
-mod withheld;
 
 use clap::Parser;
-use cli::{Cli, Command};
+use gapscope::cli::Cli;
 use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
-        Command::Diagnose(args) => diagnose::run(&args),
-        Command::Evaluate(args) => evaluate::run(&args),
-        Command::Export(args) => export::run(&args),
-        Command::Inspect(args) => inspect::run(&args),
-        Command::Rollout(args) => rollout::run(&args),
-        Command::Study(study) => study::run(&study),
-        Command::Demo(args) => demo::run(&args),
-        Command::Generate(args) => generate::run(&args),
-        Command::Train(args) => train::run(&args),
-        Command::Withheld(args) => withheld::run(&args),
-    };
-    match result {
+    match gapscope::run(&Cli::parse().command) {
         Ok(text) => {
             let mut out = std::io::stdout();
             match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {

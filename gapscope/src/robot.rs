@@ -47,6 +47,11 @@ fn is_xacro(text: &str) -> bool {
 }
 
 impl Description {
+    /// A URDF or MJCF text that is in memory.
+    pub fn of(text: String) -> Description {
+        Description { text, findings: Vec::new() }
+    }
+
     /// The text, xacro expanded.
     pub fn text(&self) -> &str {
         &self.text

@@ -1,7 +1,7 @@
 //! `gapscope rollout`: how the models' errors grow over the horizon, beside what one-step errors allow.
 
 use crate::cli::{Kind, Rollout};
-use crate::input::load;
+use crate::input::{Loaded, load};
 use crate::learned;
 use crate::output;
 use crate::report::terminal::{fill, pad};
@@ -18,6 +18,53 @@ use std::time::Duration;
 /// # Errors
 /// Bad input, or a page that exists or cannot be written.
 pub fn run(args: &Rollout) -> Result<String> {
+    options(args)?;
+    let first = args.input.logs.first().context("no log is given")?;
+    let page = match &args.out {
+        Some(file) if file.exists() && !args.force => {
+            bail!("{} exists already; choose another name, or allow it to be replaced with --force", file.display())
+        }
+        Some(file) => file.clone(),
+        None => output::new_folder(first.parent().unwrap_or(std::path::Path::new("")), "rollout")?.join("rollout.html"),
+    };
+    if let Some(folder) = page.parent() {
+        output::writable(folder)?;
+    }
+    let loaded = load(&args.input)?;
+    loaded.warn();
+    let progress = ProgressBar::new_spinner().with_message("rolling out");
+    progress.enable_steady_tick(Duration::from_millis(120));
+    let rolled = rolled(args, &loaded)?;
+    progress.finish_and_clear();
+    output::write(&page, &rolled.page)?;
+    Ok(format!("{}Picture  {}", rolled.text, page.display()))
+}
+
+/// Rollouts, in the forms in which they are given.
+#[derive(Debug)]
+pub struct Rolled {
+    /// Model by model, the nominal one first.
+    pub models: Vec<ModelRollouts>,
+    /// The tables of the terminal.
+    pub text: String,
+    /// The HTML page.
+    pub page: String,
+}
+
+/// Rolls out and writes nothing.
+///
+/// # Errors
+/// Numbers that cannot be, or models that cannot be read or do not go with the robot or the logs.
+pub fn rolled(args: &Rollout, loaded: &Loaded) -> Result<Rolled> {
+    let options = options(args)?;
+    let contenders = contenders(args, &loaded.model)?;
+    let models = rollouts(&loaded.model, &loaded.episodes, &contenders, &options)?;
+    let (robot, joints) = (loaded.model.name(), loaded.model.joints().iter().map(|j| j.name.clone()));
+    let page = rollout_page(&models, robot, &joints.collect::<Vec<_>>(), &options);
+    Ok(Rolled { text: summary(robot, &models, &options), models, page })
+}
+
+fn options(args: &Rollout) -> Result<RolloutOptions> {
     ensure!(
         args.horizon.is_finite() && (0.01..=1000.0).contains(&args.horizon),
         "--horizon is {}, expected seconds from 0.01 to 1000",
@@ -32,29 +79,7 @@ pub fn run(args: &Rollout) -> Result<String> {
         ensure!(fit.is_finite() && fit > 0.0, "--fit-start is {fit}, expected seconds above zero");
     }
     ensure!(args.starts > 0, "--starts is 0, expected at least one rollout");
-    let first = args.input.logs.first().context("no log is given")?;
-    let page = match &args.out {
-        Some(file) if file.exists() && !args.force => {
-            bail!("{} exists already; choose another name, or allow it to be replaced with --force", file.display())
-        }
-        Some(file) => file.clone(),
-        None => output::new_folder(first.parent().unwrap_or(std::path::Path::new("")), "rollout")?.join("rollout.html"),
-    };
-    if let Some(folder) = page.parent() {
-        output::writable(folder)?;
-    }
-    let loaded = load(&args.input)?;
-    loaded.warn();
-    let contenders = contenders(args, &loaded.model)?;
-    let options =
-        RolloutOptions { horizon: args.horizon, tolerance: args.tolerance, fit: args.fit_start, starts: args.starts };
-    let progress = ProgressBar::new_spinner().with_message("rolling out");
-    progress.enable_steady_tick(Duration::from_millis(120));
-    let found = rollouts(&loaded.model, &loaded.episodes, &contenders, &options)?;
-    progress.finish_and_clear();
-    let joints: Vec<String> = loaded.model.joints().iter().map(|j| j.name.clone()).collect();
-    output::write(&page, &rollout_page(&found, loaded.model.name(), &joints, &options))?;
-    Ok(format!("{}Picture  {}", summary(loaded.model.name(), &found, &options), page.display()))
+    Ok(RolloutOptions { horizon: args.horizon, tolerance: args.tolerance, fit: args.fit_start, starts: args.starts })
 }
 
 /// The models to roll out: as described, corrected, with a residual, and without physics, as far as they are given.

@@ -2,11 +2,10 @@
 
 use crate::cli::{Diagnose, Evaluate};
 use crate::input::Loaded;
-use crate::output;
 use crate::report::joint_list;
 use anyhow::{Context, Result, bail};
 use gapscope_servo::schema::{Change, Diagnosis, Estimate, Evaluation, FoundDrive, FoundEffect};
-use gapscope_servo::{Given, ServoModel};
+use gapscope_servo::{Given, Outcome, Paths, ServoModel};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -26,29 +25,48 @@ fn given(file: Option<&Path>, loaded: &Loaded) -> Result<Given> {
     Given::from_toml(&text, &joints).with_context(|| file.display().to_string())
 }
 
-/// Diagnoses a servo arm and writes diagnosis.json and corrected.json; returns what to print.
+/// Diagnoses a servo arm.
 ///
 /// # Errors
-/// A `--drive` file that cannot be read, or results that cannot be written.
-pub fn diagnose(args: &Diagnose, loaded: Loaded, out: &Path, progress: &(dyn Fn(&str, f64) + Sync)) -> Result<String> {
+/// A `--drive` file that cannot be read.
+pub fn diagnosed(args: &Diagnose, loaded: Loaded, progress: &(dyn Fn(&str, f64) + Sync)) -> Result<Outcome> {
     let given = given(args.drive.as_deref(), &loaded)?;
-    let outcome = gapscope_servo::diagnose(&loaded.model, &loaded.episodes, &given, loaded.findings, progress)?;
-    output::write(&out.join("diagnosis.json"), &serde_json::to_string_pretty(&outcome.diagnosis)?)?;
-    output::write(&out.join("corrected.json"), &serde_json::to_string_pretty(&outcome.corrected)?)?;
-    // A report of an earlier diagnosis in this folder would be of something else.
-    output::remove(&out.join("report.html"))?;
-    let mut text = summary(&outcome.diagnosis, out);
-    if args.why {
-        text += &why(&outcome.diagnosis);
-    }
-    Ok(text)
+    Ok(gapscope_servo::diagnose(&loaded.model, &loaded.episodes, &given, loaded.findings, progress)?)
 }
 
-/// Evaluates a servo arm's model; returns what to print.
+/// The files of its results.
+///
+/// # Errors
+/// Numbers that JSON cannot hold.
+pub fn files(outcome: &Outcome) -> Result<Vec<(&'static str, Option<String>)>> {
+    Ok(vec![
+        ("diagnosis.json", Some(serde_json::to_string_pretty(&outcome.diagnosis)?)),
+        ("corrected.json", Some(serde_json::to_string_pretty(&outcome.corrected)?)),
+        // A report of an earlier diagnosis in this folder would be of something else.
+        ("report.html", None),
+    ])
+}
+
+/// Which, where and how far, a sentence each.
+pub fn sentences(diagnosis: &Diagnosis) -> [String; 3] {
+    let effects: Vec<String> = diagnosis.effects.iter().map(|found| effect(found, &diagnosis.joints)).collect();
+    let which = if effects.is_empty() { "none is claimed".to_owned() } else { effects.join("; ") };
+    let worst = place(diagnosis).unwrap_or_else(|| "no joint moves".to_owned());
+    let far = format!("free run under the set points, held out: {}", change(&diagnosis.shrink.position));
+    [format!("{}. Effects: {which}", headline(diagnosis)), worst, far]
+}
+
+fn place(diagnosis: &Diagnosis) -> Option<String> {
+    let (joint, rms) = diagnosis.gap.position.rms.iter().max_by(|a, b| a.1.total_cmp(b.1))?;
+    let nominal = if diagnosis.gap.nominal == "given_servo" { "the given servo" } else { "perfect tracking" };
+    Some(format!("largest at {joint}: {} rms from {nominal}", mrad(*rms)))
+}
+
+/// Evaluates a servo arm's model.
 ///
 /// # Errors
 /// A file that cannot be read or does not fit the robot or the logs.
-pub fn evaluate(args: &Evaluate, loaded: &Loaded) -> Result<String> {
+pub fn evaluated(args: &Evaluate, loaded: &Loaded) -> Result<(Evaluation, Paths)> {
     let given = given(args.drive.as_deref(), loaded)?;
     let corrected = match &args.with {
         Some(file) => {
@@ -63,15 +81,11 @@ pub fn evaluate(args: &Evaluate, loaded: &Loaded) -> Result<String> {
         }
         None => None,
     };
-    let (evaluation, paths) = gapscope_servo::evaluate(&loaded.model, &loaded.episodes, &given, corrected.as_ref())?;
-    if let Some(file) = &args.predictions {
-        output::write(file, &table(loaded, &paths))?;
-    }
-    Ok(if args.json { serde_json::to_string(&evaluation)? } else { evaluation_summary(&evaluation) })
+    Ok(gapscope_servo::evaluate(&loaded.model, &loaded.episodes, &given, corrected.as_ref())?)
 }
 
 /// One row for each sample: log, time, then measured and simulated position of each joint.
-fn table(loaded: &Loaded, paths: &[Vec<Vec<f64>>]) -> String {
+pub fn table(loaded: &Loaded, paths: &[Vec<Vec<f64>>]) -> String {
     let mut text = String::from("log,time");
     for channel in ["measured", "simulated"] {
         for joint in loaded.model.joints() {
@@ -135,7 +149,7 @@ fn counted(number: usize, what: &str) -> String {
 }
 
 /// The diagnosis in some lines.
-fn summary(diagnosis: &Diagnosis, out: &Path) -> String {
+pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>) -> String {
     let data = &diagnosis.data;
     let mut lines = vec![
         format!(
@@ -160,10 +174,8 @@ fn summary(diagnosis: &Diagnosis, out: &Path) -> String {
         lines.push(format!("{:8} {joint}: {}", if at == 0 { "Drive" } else { "" }, driven(drive)));
         lines.extend(drive.open.iter().map(|open| format!("{:11}{open}", "")));
     }
-    let worst = diagnosis.gap.position.rms.iter().max_by(|a, b| a.1.total_cmp(b.1));
-    if let Some((joint, rms)) = worst {
-        let nominal = if diagnosis.gap.nominal == "given_servo" { "the given servo" } else { "perfect tracking" };
-        lines.push(format!("Where    largest at {joint}: {} rms from {nominal}", mrad(*rms)));
+    if let Some(place) = place(diagnosis) {
+        lines.push(format!("Where    {place}"));
     }
     for regime in diagnosis.gap.regimes.iter().filter(|r| r.ci95[0] > r.samples).take(3) {
         lines.push(format!(
@@ -181,7 +193,9 @@ fn summary(diagnosis: &Diagnosis, out: &Path) -> String {
     if data.findings.len() > FINDINGS {
         lines.push(format!("         and {} more, in diagnosis.json", data.findings.len() - FINDINGS));
     }
-    lines.push(format!("Results  {}", out.display()));
+    if let Some(out) = out {
+        lines.push(format!("Results  {}", out.display()));
+    }
     plain(&lines)
 }
 
@@ -242,7 +256,7 @@ fn driven(drive: &FoundDrive) -> String {
     }
 }
 
-fn why(diagnosis: &Diagnosis) -> String {
+pub fn why(diagnosis: &Diagnosis) -> String {
     let mut lines =
         vec![String::new(), "Why      what was proposed, and by how many nats it won (+) or lost (-)".to_owned()];
     for why in &diagnosis.why {
@@ -258,7 +272,7 @@ fn why(diagnosis: &Diagnosis) -> String {
     plain(&lines)
 }
 
-fn evaluation_summary(evaluation: &Evaluation) -> String {
+pub fn evaluation_summary(evaluation: &Evaluation) -> String {
     let mut lines = Vec::new();
     if let Some(shrink) = &evaluation.shrink {
         lines.push(format!("How far  free run under the set points: {}", change(&shrink.position)));

@@ -1,7 +1,7 @@
 //! `gapscope train`: a residual on the robot's model, or a pure network, from logs.
 
 use crate::cli::{Kind, Train};
-use crate::input::load;
+use crate::input::{Loaded, load};
 use crate::output;
 use crate::picture::{Series, svg};
 use crate::report::axis::Axis;
@@ -60,6 +60,37 @@ struct Errors {
 pub fn run(args: &Train) -> Result<String> {
     let first = args.input.logs.first().context("no log is given")?;
     let out = folder(args, first)?;
+    // What is wrong with the arguments is better known before the logs are read.
+    checked(args)?;
+    output::writable(&out)?;
+    let loaded = load(&args.input)?;
+    loaded.warn();
+    let bar = ProgressBar::new(args.epochs as u64);
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} epoch {pos} of {len}, {eta} left  {msg}") {
+        bar.set_style(style);
+    }
+    let mut heard = |epoch: &Epoch| {
+        bar.set_position(epoch.epoch as u64);
+        bar.set_message(format!("loss {:.2e}, held out {:.2e}", epoch.train, epoch.held_out.unwrap_or(f64::NAN)));
+    };
+    let trained = trained(args, &loaded, &mut heard)?;
+    bar.finish_and_clear();
+    for (name, bytes) in &trained.files {
+        output::write_bytes(&out.join(name), bytes)?;
+    }
+    Ok(format!("{}\nWeights  {}", trained.told, out.join(FILES[0]).display()))
+}
+
+/// What training gave.
+#[derive(Debug)]
+pub struct Trained {
+    /// The files of its folder: weights in three formats, record and learning curve.
+    pub files: Vec<(&'static str, Vec<u8>)>,
+    /// How well it learned, in two lines.
+    pub told: String,
+}
+
+fn checked(args: &Train) -> Result<(Learner, On)> {
     let learner = learner(args)?;
     let on = args.on.unwrap_or_default();
     if args.kind == Kind::Pure && args.on.is_some() {
@@ -68,9 +99,15 @@ pub fn run(args: &Train) -> Result<String> {
     if !(args.dt > 0.0 && args.dt.is_finite()) {
         bail!("--dt is {}; expected a positive time in s", args.dt);
     }
-    output::writable(&out)?;
-    let loaded = load(&args.input)?;
-    loaded.warn();
+    Ok((learner, on))
+}
+
+/// Trains and writes nothing; `heard` is told of each epoch.
+///
+/// # Errors
+/// Settings that cannot be, or logs too short for them.
+pub fn trained(args: &Train, loaded: &Loaded, heard: &mut dyn FnMut(&Epoch)) -> Result<Trained> {
+    let (learner, on) = checked(args)?;
     let (mut train, mut held_out) = (Transitions::default(), Transitions::default());
     for (i, episode) in loaded.episodes.iter().enumerate() {
         let seen = transitions(episode, args.dt);
@@ -89,32 +126,23 @@ pub fn run(args: &Train) -> Result<String> {
         bail!("the logs hold {} steps of {} s; at least 10 are needed", train.len() + held_out.len(), args.dt);
     }
 
-    let bar = ProgressBar::new(learner.settings.epochs as u64);
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} epoch {pos} of {len}, {eta} left  {msg}") {
-        bar.set_style(style);
-    }
-    let mut heard = |epoch: &Epoch| {
-        bar.set_position(epoch.epoch as u64);
-        bar.set_message(format!("loss {:.2e}, held out {:.2e}", epoch.train, epoch.held_out.unwrap_or(f64::NAN)));
-    };
     let mut physics = Plant::nominal(&loaded.model, args.dt);
     let before = velocity_rms(&held_out, &mut physics);
     let (trained, after) = match args.kind {
         Kind::Residual => {
             let trained =
-                gapscope_residual::learn::<f32>(&mut physics, &train, Some(&held_out), on, &learner, None, &mut heard)?;
+                gapscope_residual::learn::<f32>(&mut physics, &train, Some(&held_out), on, &learner, None, heard)?;
             let mut hybrid = Hybrid::new(physics, Net::new(trained.network.clone()), on)?;
             let after = velocity_rms(&held_out, &mut hybrid);
             (trained, after)
         }
         Kind::Pure => {
-            let trained = gapscope_pure::learn::<f32>(&train, Some(&held_out), &learner, &mut heard)?;
+            let trained = gapscope_pure::learn::<f32>(&train, Some(&held_out), &learner, heard)?;
             let mut pure = Pure::new(train.joints, args.dt, Net::new(trained.network.clone()))?;
             let after = velocity_rms(&held_out, &mut pure);
             (trained, after)
         }
     };
-    bar.finish_and_clear();
 
     let errors = Errors { physics: before, learned: after };
     let record = Record {
@@ -129,19 +157,19 @@ pub fn run(args: &Train) -> Result<String> {
         best_epoch: trained.best,
         held_out: errors,
     };
-    write(&out, &trained.network, &trained.history, &record)?;
+    let files = files(&trained.network, &trained.history, &record)?;
     let what = if args.kind == Kind::Residual { "physics and residual" } else { "pure network" };
-    Ok(format!(
-        "{} steps of {} s, {} of them held out; best epoch {} of {}\nHeld-out one-step velocity error, rms: physics {}, {what} {}\nWeights  {}",
+    let told = format!(
+        "{} steps of {} s, {} of them held out; best epoch {} of {}\nHeld-out one-step velocity error, rms: physics {}, {what} {}",
         train.len() + held_out.len(),
         args.dt,
         held_out.len(),
         trained.best,
         trained.history.len(),
         figure(before),
-        figure(after),
-        out.join(FILES[0]).display()
-    ))
+        figure(after)
+    );
+    Ok(Trained { files, told })
 }
 
 fn folder(args: &Train, first: &std::path::Path) -> Result<PathBuf> {
@@ -188,16 +216,11 @@ pub fn velocity_rms(seen: &Transitions, model: &mut dyn StepModel) -> f64 {
     (sum / (seen.len() * n).max(1) as f64).sqrt()
 }
 
-fn write(out: &std::path::Path, network: &Mlp<f32>, history: &[Epoch], record: &Record<'_>) -> Result<()> {
-    output::write_bytes(&out.join(FILES[0]), &to_safetensors(network)?)?;
-    output::write(&out.join(FILES[1]), &to_json(network)?)?;
-    output::write_bytes(&out.join(FILES[2]), &to_onnx(network))?;
-    output::write(&out.join(FILES[3]), &serde_json::to_string_pretty(record)?)?;
+fn files(network: &Mlp<f32>, history: &[Epoch], record: &Record<'_>) -> Result<Vec<(&'static str, Vec<u8>)>> {
     let mut table = String::from("epoch,train,held_out\n");
     for e in history {
         let _ = writeln!(table, "{},{},{}", e.epoch, e.train, e.held_out.unwrap_or(f64::NAN));
     }
-    output::write(&out.join(FILES[4]), &table)?;
     let line = |name: &str, of: &dyn Fn(&Epoch) -> f64| Series {
         name: name.into(),
         points: history.iter().map(|e| [e.epoch as f64, of(e)]).collect(),
@@ -206,5 +229,13 @@ fn write(out: &std::path::Path, network: &Mlp<f32>, history: &[Epoch], record: &
     let series = [line("training rows", &|e| e.train), line("held out", &|e| e.held_out.unwrap_or(f64::NAN))];
     let x = Axis::tight([0.0, history.len() as f64], "epoch", 6);
     let y = Axis::powers(series.iter().flat_map(|s| &s.points).map(|p| p[1]), "loss, targets of variance one");
-    output::write(&out.join(FILES[5]), &svg(&format!("{} network, {}", record.kind, record.robot), &x, &y, &series))
+    let content = [
+        to_safetensors(network)?,
+        to_json(network)?.into_bytes(),
+        to_onnx(network),
+        serde_json::to_string_pretty(record)?.into_bytes(),
+        table.into_bytes(),
+        svg(&format!("{} network, {}", record.kind, record.robot), &x, &y, &series).into_bytes(),
+    ];
+    Ok(FILES.into_iter().zip(content).collect())
 }

@@ -2,9 +2,7 @@
 
 use super::{LogReader, Request};
 use crate::arrays::{self, Array, MOST_NUMBERS};
-use crate::episode::Channel;
 use crate::error::{LogError, LogErrorKind};
-use crate::recording::Recording;
 use crate::table::Table;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
@@ -28,17 +26,7 @@ impl LogReader for Parquet {
                 }
             }
         }
-        let native = |array: &Array| {
-            array.name.split_once('.').is_some_and(|(channel, _)| Channel::from_name(channel).is_some())
-                && array.shape.len() == 1
-        };
-        let recording = if whole.iter().any(native) {
-            let flat = whole.into_iter().filter(|array| array.shape.len() == 1);
-            Recording { columns: flat.map(|array| (array.name, array.values)).collect(), ..Recording::default() }
-        } else {
-            arrays::recording(&whole, None, request)?
-        };
-        each(recording.table(request)?);
+        each(arrays::columns_or_whole(whole, request)?.table(request)?);
         Ok(())
     }
 }

@@ -1,0 +1,44 @@
+//! What the `gapscope` command does, as a library: each command is a module with a function `run`, which takes the
+//! arguments of [`cli`] and returns what to print. The Python package calls the same code.
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod cli;
+mod demo;
+pub mod diagnose;
+pub mod evaluate;
+mod export;
+pub mod generate;
+pub mod input;
+pub mod inspect;
+pub mod learned;
+mod output;
+mod picture;
+mod report;
+pub mod robot;
+pub mod rollout;
+mod servo;
+mod study;
+mod summary;
+pub mod train;
+mod withheld;
+
+use cli::Command;
+
+/// Does what the command line asks for; returns what to print.
+///
+/// # Errors
+/// Bad input, in words that name cause and mend.
+pub fn run(command: &Command) -> anyhow::Result<String> {
+    match command {
+        Command::Diagnose(args) => diagnose::run(args),
+        Command::Evaluate(args) => evaluate::run(args),
+        Command::Export(args) => export::run(args),
+        Command::Inspect(args) => inspect::run(args),
+        Command::Rollout(args) => rollout::run(args),
+        Command::Study(study) => study::run(study),
+        Command::Demo(args) => demo::run(args),
+        Command::Generate(args) => generate::run(args),
+        Command::Train(args) => train::run(args),
+        Command::Withheld(args) => withheld::run(args),
+    }
+}

@@ -50,11 +50,9 @@ pub fn run(args: &Demo) -> Result<String> {
         logs.push(path);
     }
     // From here on only the files count: the diagnosis reads what a user's robot would have left.
-    let input = Input { robot: urdf.clone(), logs: logs.clone(), ..Input::default() };
-    let mut outcome = with_progress(load(&input)?)?;
-    outcome.evidence.robot_file = urdf.display().to_string();
-    outcome.evidence.logs = logs.iter().map(|l| l.display().to_string()).collect();
-    write(&outcome, &out)?;
+    let input = Input { robot: urdf, logs, ..Input::default() };
+    let (outcome, setting) = with_progress(load(&input)?, &input)?;
+    write(&outcome, &setting, &out)?;
     let color = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let mut text =
         format!("A 7-joint arm moves with an effect that its model lacks; its logs are in {}.\n\n", out.display());

@@ -1,7 +1,8 @@
 //! `gapscope diagnose`.
 
-use crate::cli::Diagnose;
+use crate::cli::{Diagnose, Input};
 use crate::input::{Loaded, load_any};
+use crate::report::Setting;
 use crate::{output, report, servo, summary};
 use anyhow::{Context, Result};
 use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, diagnose};
@@ -24,10 +25,8 @@ pub fn run(args: &Diagnose) -> Result<String> {
         progress.finish();
         return Ok(text);
     }
-    let mut outcome = diagnosed(loaded, &progress)?;
-    outcome.evidence.robot_file = args.input.robot.display().to_string();
-    outcome.evidence.logs = args.input.logs.iter().map(|l| l.display().to_string()).collect();
-    write(&outcome, &out)?;
+    let (outcome, setting) = diagnosed(loaded, &args.input, &progress)?;
+    write(&outcome, &setting, &out)?;
     let color = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let mut text = summary::summary(&outcome.diagnosis, Some(&out.join("report.html")), color);
     if args.why {
@@ -36,29 +35,33 @@ pub fn run(args: &Diagnose) -> Result<String> {
     Ok(text)
 }
 
-/// Diagnoses what is loaded, with progress on the terminal.
+/// Diagnoses what is loaded, with progress on the terminal; beside it what the report says of robot and files.
 ///
 /// # Errors
 /// None that a log can cause.
-pub fn with_progress(loaded: Loaded) -> Result<Outcome> {
-    diagnosed(loaded, &Progress::new())
+pub fn with_progress(loaded: Loaded, input: &Input) -> Result<(Outcome, Setting)> {
+    diagnosed(loaded, input, &Progress::new())
 }
 
-fn diagnosed(loaded: Loaded, progress: &Progress) -> Result<Outcome> {
-    let Loaded { model, episodes, findings, faults, doubts, origin } = loaded;
+fn diagnosed(loaded: Loaded, input: &Input, progress: &Progress) -> Result<(Outcome, Setting)> {
+    let Loaded { model, episodes, findings, faults, doubts, origin, description, held } = loaded;
     let mut outcome = diagnose(&model, &episodes, findings, &|s, p| progress.stage(s, p))?;
     progress.finish();
     outcome.within_physics(&model);
     outcome.under(faults, doubts);
     outcome.corrected.made_from = Some(origin);
-    Ok(outcome)
+    outcome.evidence.robot_file = input.robot.display().to_string();
+    outcome.evidence.logs = input.logs.iter().map(|l| l.display().to_string()).collect();
+    let described = description.model(&input.robot, &held).ok();
+    let setting = Setting::new(&model, &episodes, &outcome.corrected, &description, described.as_ref());
+    Ok((outcome, setting))
 }
 
 /// Writes diagnosis.json, corrected.json, report.html and, where one is proposed, the next motion into a folder.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write(outcome: &Outcome, out: &Path) -> Result<()> {
+pub fn write(outcome: &Outcome, setting: &Setting, out: &Path) -> Result<()> {
     let proposed = outcome.diagnosis.next_experiment.as_ref().and_then(|next| next.trajectory.as_ref());
     let motion = proposed.zip(outcome.trajectory.as_ref()).map(|(_, trajectory)| trajectory.to_csv());
     let mut evidence = outcome.evidence.clone();
@@ -66,7 +69,7 @@ pub fn write(outcome: &Outcome, out: &Path) -> Result<()> {
     let files = [
         ("diagnosis.json", Some(serde_json::to_string_pretty(&outcome.diagnosis)?)),
         ("corrected.json", Some(outcome.corrected.to_json()?)),
-        ("report.html", Some(report::html(&outcome.diagnosis, &evidence))),
+        ("report.html", Some(report::html(&outcome.diagnosis, &evidence, setting))),
         // The advice of an earlier diagnosis in this folder is out of date.
         (NEXT_EXPERIMENT, motion),
     ];

@@ -46,7 +46,8 @@ pub fn run(args: &RealLogs) -> Result<String> {
 
 /// Diagnoses one log, writes its page and its pictures; returns the summary.
 fn write(folder: &Path, log: &Log, out: &Path) -> Result<String> {
-    let outcome = with_progress(load(&input(folder, log.log))?)?;
+    let input_of = input(folder, log.log);
+    let (outcome, _) = with_progress(load(&input_of)?, &input_of)?;
     let others = log.others.iter().filter(|_| !outcome.diagnosis.effects.is_empty()).map(|&name| {
         let loaded = load(&input(folder, name))?;
         let (evaluation, _) = evaluate(&loaded.model, &loaded.episodes, Some(&outcome.corrected))?;

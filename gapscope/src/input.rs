@@ -135,7 +135,16 @@ fn checked(
     // What is held against the model weighs most, what the reader of the robot passed over least.
     let checks = check_logs(&model, &episodes);
     let findings = checks.iter().chain(&said).map(ToString::to_string).collect();
-    Ok(Loaded { model, episodes, findings, faults: found.faults, doubts: found.doubts, origin: origin(input)?, description, held })
+    Ok(Loaded {
+        model,
+        episodes,
+        findings,
+        faults: found.faults,
+        doubts: found.doubts,
+        origin: origin(input)?,
+        description,
+        held,
+    })
 }
 
 /// How the logs are to be read.

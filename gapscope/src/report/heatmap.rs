@@ -25,7 +25,13 @@ struct Column<'a> {
 
 /// The heat map, or a sentence where there is nothing to show; `whole` says what the shares are parts of, `quiet` which
 /// joints are at the noise floor and stay pale.
-pub fn render(joints: &[String], regimes: &[Regime], caption: &str, whole: &str, quiet: &dyn Fn(&str) -> bool) -> Markup {
+pub fn render(
+    joints: &[String],
+    regimes: &[Regime],
+    caption: &str,
+    whole: &str,
+    quiet: &dyn Fn(&str) -> bool,
+) -> Markup {
     let joints: Vec<&String> = joints.iter().filter(|joint| regimes.iter().any(|r| r.joint == **joint)).collect();
     let groups = groups(&joints, regimes);
     if groups.is_empty() || joints.is_empty() {
@@ -103,7 +109,13 @@ fn cell(regime: Option<&Regime>, first: bool, quiet: bool) -> Markup {
     };
     // Where a gap is noise, its shares are those of noise.
     let marked = !quiet && words::stands_out(regime);
-    let shade = if quiet { 0.0 } else if regime.share.is_finite() { regime.share.clamp(0.0, 1.0) } else { 0.0 };
+    let shade = if quiet {
+        0.0
+    } else if regime.share.is_finite() {
+        regime.share.clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     html! {
         td.marked[marked] .first[first] style={ "--a:" (super::chart::short(shade)) } title=(tip(regime)) {
             (whole_percent(regime.share))

@@ -75,6 +75,8 @@ fn row(joint: &str, diagnosis: &Diagnosis, after: Option<&TorqueGap>, evidence: 
 /// How many times smaller the gap has become; a bar beside one a hundred times as long cannot be seen.
 fn factor(before: Option<&Bar>, after: Option<&Bar>) -> String {
     match (before, after) {
+        // A tenth more or less is none: the gap was noise already.
+        (Some(before), Some(after)) if (before.value / after.value - 1.0).abs() < 0.1 => "same".into(),
         (Some(before), Some(after)) if after.value > 0.0 && before.value.is_finite() => {
             format!("{}×", plain_two(before.value / after.value))
         }

@@ -86,7 +86,7 @@ pub fn html(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> St
         (header(diagnosis, evidence, setting))
         main { (body(diagnosis, evidence, setting)) }
         p #filter role="status" hidden { "Showing " b {} " only " button type="button" { "Show all joints" } }
-        script type="application/json" id="data" { (PreEscaped(data)) }
+        script type="application/json" id="packet" { (PreEscaped(data)) }
         script { (PreEscaped(format!("/*\n{CHART_LICENCE}*/\n{CHART}"))) }
         script { (PreEscaped(format!("(() => {{\n{}\n}})();", SCRIPTS.join("\n")))) }
     };
@@ -120,7 +120,7 @@ fn header(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Mark
     let data = &diagnosis.data;
     html! {
         header {
-            div.first {
+            div.opening {
                 div {
                     p.kicker {
                         b { (diagnosis.robot) } " · " (count(diagnosis.joints.len(), "joint")) ", "

@@ -63,9 +63,7 @@ fn clause(effect: &FoundEffect, all: &[String]) -> String {
     };
     match effect.kind.as_str() {
         "coulomb_friction" => lacking(verb("rubs", "rub"), size("coulomb"), "dry friction"),
-        "viscous_friction" => {
-            lacking(verb("rubs with speed", "rub with speed"), size("viscous"), "viscous friction")
-        }
+        "viscous_friction" => lacking(verb("rubs with speed", "rub with speed"), size("viscous"), "viscous friction"),
         "stribeck_friction" => {
             lacking(verb("rubs most near rest", "rub most near rest"), size("static"), "friction at rest")
         }
@@ -113,10 +111,7 @@ fn reach(diagnosis: &Diagnosis) -> String {
         return "How far the gap would shrink is unknown until the robot moves more.".into();
     }
     if diagnosis.effects.is_empty() {
-        return format!(
-            "The torque gap is {} of the effort’s spread; noise alone gives {floor}.",
-            percent(before)
-        );
+        return format!("The torque gap is {} of the effort’s spread; noise alone gives {floor}.", percent(before));
     }
     let them = if diagnosis.effects.len() == 1 { "With it" } else { "With them" };
     let moves = match (before, after) {
@@ -140,8 +135,11 @@ fn caution(diagnosis: &Diagnosis) -> String {
         return format!("Beware, the logs have {}: {}.", count(data.faults.len(), "fault"), faults(&data.faults));
     }
     if !data.doubts.is_empty() {
-        return format!("Beware, {} of the logs {} open; the answer hangs on it.",
-            count(data.doubts.len(), "question"), if data.doubts.len() == 1 { "is" } else { "are" });
+        return format!(
+            "Beware, {} of the logs {} open; the answer hangs on it.",
+            count(data.doubts.len(), "question"),
+            if data.doubts.len() == 1 { "is" } else { "are" }
+        );
     }
     if diagnosis.verdict == Verdict::NotExcited {
         let next = diagnosis.next_experiment.as_ref().map(|next| next.motion.trim_end_matches('.'));

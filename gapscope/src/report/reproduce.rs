@@ -21,7 +21,10 @@ pub fn render(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> 
     let logs = if logs.is_empty() { "LOG...".into() } else { logs.join(" ") };
     let with = if diagnosis.effects.is_empty() { String::new() } else { format!(" --with {corrected}") };
     let commands = [
-        ("The same figures on logs that this diagnosis has not seen", format!("gapscope evaluate {robot} OTHER_LOG...{with}")),
+        (
+            "The same figures on logs that this diagnosis has not seen",
+            format!("gapscope evaluate {robot} OTHER_LOG...{with}"),
+        ),
         (
             "Measured, nominal and corrected torque of every sample, to check the figures by other means",
             format!("gapscope evaluate {robot} {logs}{with} --predictions predictions.csv"),

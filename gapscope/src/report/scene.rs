@@ -60,6 +60,7 @@ pub struct Packet<'a> {
     parents: Vec<i64>,
     tips: &'a [usize],
     step: f64,
+    still: usize,
     time: Packed,
     /// One row for each coordinate of each point.
     points: Vec<Packed>,
@@ -95,9 +96,14 @@ impl Scene {
         Scene { joints, parents, tips: skeleton.tips, time, frames, rollouts, horizon }
     }
 
-    /// The frame in the middle of the logs.
-    pub fn still(&self) -> Option<&[DVec3]> {
-        self.frames.get(self.frames.len() / 2).map(Vec::as_slice)
+    /// The frame that shows the robot at its widest: folded up, its joints hide each other.
+    pub fn still(&self) -> usize {
+        let spread = |frame: &Vec<DVec3>| {
+            let center = frame.iter().sum::<DVec3>() / frame.len().max(1) as f64;
+            frame.iter().map(|p| (*p - center).length_squared()).sum::<f64>()
+        };
+        let spreads: Vec<f64> = self.frames.iter().map(spread).collect();
+        (0..spreads.len()).max_by(|&a, &b| spreads[a].total_cmp(&spreads[b])).unwrap_or(0)
     }
 
     /// As numbers for the script.
@@ -107,6 +113,7 @@ impl Scene {
             parents: self.parents.iter().map(|p| p.map_or(-1, |p| p as i64)).collect(),
             tips: &self.tips,
             step: STEP,
+            still: self.still(),
             time: Packed::new(&self.time, 1e-3),
             points: rows(&self.frames),
             horizon: self.horizon,
@@ -117,9 +124,7 @@ impl Scene {
 
 fn rows(frames: &[Vec<DVec3>]) -> Vec<Packed> {
     let points = frames.first().map_or(0, Vec::len);
-    (0..3 * points)
-        .map(|c| Packed::new(&frames.iter().map(|f| f[c / 3][c % 3]).collect::<Vec<_>>(), STEP))
-        .collect()
+    (0..3 * points).map(|c| Packed::new(&frames.iter().map(|f| f[c / 3][c % 3]).collect::<Vec<_>>(), STEP)).collect()
 }
 
 fn sample(rows: &[Vec<f64>], k: usize) -> Vec<f64> {

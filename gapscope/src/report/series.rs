@@ -1,10 +1,10 @@
 //! Measured against modelled torque over time, one small multiple for each joint.
 
+use super::answer;
 use super::axis::Axis;
 use super::chart::{Plot, band, envelope, line};
 use super::format::{count, figure, with_unit};
 use super::packed::{self, Packed};
-use super::answer;
 use crate::picture::{Panel, Series, panels};
 use gapscope_diagnosis::schema::{Diagnosis, Evidence, TorqueSeries};
 use maud::{Markup, html};
@@ -82,8 +82,11 @@ pub fn packets(evidence: &Evidence) -> Vec<Packet<'_>> {
 
 fn packet(series: &TorqueSeries, stretches: usize) -> Packet<'_> {
     let lines = [&series.measured, &series.nominal, &series.corrected];
-    let mut kept: Vec<usize> =
-        lines.iter().filter(|l| l.len() == series.time.len()).flat_map(|l| envelope(l, &series.breaks, stretches)).collect();
+    let mut kept: Vec<usize> = lines
+        .iter()
+        .filter(|l| l.len() == series.time.len())
+        .flat_map(|l| envelope(l, &series.breaks, stretches))
+        .collect();
     kept.sort_unstable();
     kept.dedup();
     let step = packed::step(lines.into_iter().flatten().copied());
@@ -131,7 +134,7 @@ pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
             div.chart tabindex="0" role="application"
                 aria-label="Torque over time of the joint chosen. Arrow keys read it, plus and minus zoom, shift with arrows moves, 0 shows all." {}
             output aria-live="polite" {}
-            p.note { "Drag over a stretch to zoom, double-click to see all. Episodes one after another, fits on held-out data, thinned so that peaks stay." }
+            p.note { "Below: measured less each model. Drag over a stretch to zoom, double-click to see all. Episodes one after another, fits on held-out data, thinned so that peaks stay." }
         }
         div data-still="" { (joint(shown, &rms(&shown.joint, diagnosis, evidence), stretches)) }
         details.all-joints open[drawn.len() <= OPEN] {
@@ -161,8 +164,7 @@ fn shade(series: &TorqueSeries, stretches: usize, x: &Axis, y: &Axis) -> Markup 
         return html! {};
     }
     let kept = envelope(&gap, &series.breaks, stretches);
-    let points: Vec<[f64; 3]> =
-        kept.iter().map(|&i| [series.time[i], series.nominal[i], series.measured[i]]).collect();
+    let points: Vec<[f64; 3]> = kept.iter().map(|&i| [series.time[i], series.nominal[i], series.measured[i]]).collect();
     band(&points, x, y, "gap")
 }
 

@@ -11,7 +11,7 @@ use maud::{Markup, html};
 const VIEW: [f64; 2] = [-0.6, 0.3];
 /// Corners of the circle that stands for the floor, and its radius as a part of the picture.
 const FLOOR: usize = 48;
-const FLOOR_RADIUS: f64 = 0.45;
+const FLOOR_RADIUS: f64 = 0.35;
 
 /// How boldly a joint is drawn: its gap as a part of the largest with the same unit; `None` at the noise floor.
 pub fn boldness(diagnosis: &Diagnosis, evidence: &Evidence, joint: &str) -> Option<f64> {
@@ -34,7 +34,7 @@ fn tone(bold: Option<f64>) -> (&'static str, String) {
 pub fn render(diagnosis: &Diagnosis, evidence: &Evidence, scene: Option<&Scene>) -> Markup {
     html! {
         div.robot {
-            @if let Some((scene, still)) = scene.and_then(|s| Some((s, s.still()?))) {
+            @if let Some((scene, still)) = scene.and_then(|s| Some((s, s.frames.get(s.still())?))) {
                 (picture(diagnosis, evidence, scene, still))
             }
             (chips(diagnosis, evidence))
@@ -60,7 +60,7 @@ fn picture(diagnosis: &Diagnosis, evidence: &Evidence, scene: &Scene, still: &[D
     };
     html! {
         figure.skeleton {
-            svg #skeleton viewBox="-1.1 -1.1 2.2 2.2" role="group" tabindex="0"
+            svg #skeleton viewBox="-1 -1 2 2" role="group" tabindex="0"
                 aria-label={ "Skeleton of " (diagnosis.robot) ", joints coloured by torque gap. Arrow keys turn it." } {
                 polyline.floor points=(floor.join(" ")) {}
                 g.links {

@@ -1,6 +1,6 @@
 // The filter by joint, the copy button, and hints beside what scrolls.
 "use strict";
-const data = JSON.parse(document.getElementById("data").textContent);
+const data = JSON.parse(document.getElementById("packet").textContent);
 const unpack = (row, step) => {
   let sum = 0;
   return row.map((difference) => difference == null ? null : (sum += difference) * step);

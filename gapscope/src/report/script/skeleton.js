@@ -21,7 +21,7 @@ if (scene && skeleton) {
     }
   }
   radius = Math.max(radius, Math.hypot(...center)) || 1;
-  let yaw = -0.6, pitch = 0.3, frame = Math.floor(time.length / 2), playing = null, rolled = 0;
+  let yaw = -0.6, pitch = 0.3, frame = scene.still, playing = null, rolled = 0;
 
   const project = ([x, y, z]) => {
     const p = [(x - center[0]) / radius, (y - center[1]) / radius, (z - center[2]) / radius];
@@ -70,7 +70,7 @@ if (scene && skeleton) {
     const ring = [];
     for (let k = 0; k <= 48; k++) {
       const angle = 2 * Math.PI * k / 48;
-      ring.push(project([0.45 * radius * Math.cos(angle), 0.45 * radius * Math.sin(angle), 0]).slice(0, 2).map((x) => x.toFixed(3)));
+      ring.push(project([0.35 * radius * Math.cos(angle), 0.35 * radius * Math.sin(angle), 0]).slice(0, 2).map((x) => x.toFixed(3)));
     }
     floor.setAttribute("points", ring.join(" "));
     ghosts.replaceChildren(...(playing === "rollout" ? rollouts.slice(1).flatMap(ghost) : []));
@@ -109,7 +109,11 @@ if (scene && skeleton) {
     pitch = Math.max(-1.5, Math.min(1.5, pitch0 + (event.clientY - y) * 0.01));
     draw();
   });
-  window.addEventListener("pointerup", () => { held = null; });
+  window.addEventListener("pointerup", () => {
+    held = null;
+    // The click that ends a turn is none; the next one is.
+    setTimeout(() => { turned = false; });
+  });
   window.addEventListener("pointercancel", () => { held = null; });
   skeleton.addEventListener("keydown", (event) => {
     const turn = { ArrowLeft: [0.12, 0], ArrowRight: [-0.12, 0], ArrowUp: [0, 0.12], ArrowDown: [0, -0.12] }[event.key];
@@ -151,7 +155,7 @@ if (scene && skeleton) {
     let k = Math.floor(first);
     const step = (now) => {
       if (playing !== button.dataset.play) return;
-      const seconds = (now - start) / 1000;
+      const seconds = Math.max(0, now - start) / 1000;
       if (playing === "rollout") {
         // A quarter of the robot's speed: a rollout is short.
         const length = rollouts[0].rows[0].length - 1;

@@ -10,7 +10,7 @@ if (live && data.torque.length && window.uPlot) {
     s.breaks.forEach((k) => [values.m, values.n, values.c].forEach((row) => { if (row.length) row[k] = null; }));
     return values;
   });
-  let chart = null, current = series[0];
+  let chart = null, errors = null, current = series[0], moving = false;
   const figure = (x) => x == null ? "–" : (Math.abs(x) >= 100 ? x.toFixed(0) : Math.abs(x) >= 1 ? x.toFixed(2) : x.toPrecision(2)).replace("-", "−");
   const say = () => {
     const k = chart.cursor.idx;
@@ -31,21 +31,39 @@ if (live && data.torque.length && window.uPlot) {
     if (current.c.length) list.push({ label: "with the effects", stroke: color("--after"), width: 1.4, dash: [6, 3] });
     const shade = color("--shade");
     return {
-      width: box.clientWidth, height: Math.max(200, Math.min(300, box.clientWidth * 0.4)),
-      legend: { show: false }, cursor: { drag: { x: true, y: false }, focus: { prox: 24 } },
+      width: box.clientWidth, height: tall(),
+      legend: { show: false }, cursor: { drag: { x: true, y: false }, focus: { prox: 24 }, sync: { key: "torque" } },
       scales: { x: { time: false } }, series: list,
-      bands: [{ series: [1, 2], fill: shade, dir: -1 }, { series: [1, 2], fill: shade, dir: 1 }],
-      axes: [{ ...axis, label: "time, s" }, { ...axis, label: "torque, " + current.unit, size: 56 }],
-      hooks: { setCursor: [() => { say(); if (chart.cursor.idx != null) pose(current.t[chart.cursor.idx]); }] },
+      bands: [{ series: [1, 2], fill: shade }, { series: [2, 1], fill: shade }],
+      axes: [{ ...axis, size: 28 }, { ...axis, label: "torque, " + current.unit, size: 56 }],
+      hooks: { setCursor: [() => { say(); if (chart.cursor.idx != null) pose(current.t[chart.cursor.idx]); }], setScale: [same] },
     };
+  };
+  // What is left of the measured torque: a gap of a newton metre shows beside none of sixty.
+  const below = () => {
+    const { series: lines, axes, bands: _, hooks: __, ...rest } = options();
+    return {
+      ...rest, height: low(), series: [{}, ...lines.slice(2).map((line, i) => ({ ...line, fill: i ? undefined : color("--shade") }))],
+      axes: [{ ...axes[0], label: "time, s", size: 46 }, { ...axes[1], label: "gap, " + current.unit }], hooks: { setScale: [same] },
+    };
+  };
+  const tall = () => Math.max(170, Math.min(250, box.clientWidth * 0.35)), low = () => Math.max(130, Math.min(190, box.clientWidth * 0.25));
+  const same = (one, key) => {
+    if (key !== "x" || moving || !chart || !errors) return;
+    moving = true;
+    const { min, max } = one.scales.x;
+    (one === chart ? errors : chart).setScale("x", { min, max });
+    moving = false;
   };
   const make = () => {
     const range = chart && [chart.scales.x.min, chart.scales.x.max];
-    if (chart) chart.destroy();
+    [chart, errors].forEach((one) => one && one.destroy());
+    chart = errors = null;
     const rows = [current.t, current.m, current.n];
     if (current.c.length) rows.push(current.c);
     chart = new uPlot(options(), rows, box);
-    box.querySelector("canvas").setAttribute("aria-hidden", "true");
+    errors = new uPlot(below(), [rows[0], ...rows.slice(2).map((row) => row.map((x, k) => x == null ? null : rows[1][k] - x))], box);
+    box.querySelectorAll("canvas").forEach((canvas) => canvas.setAttribute("aria-hidden", "true"));
     if (range && range[0] != null) chart.setScale("x", { min: range[0], max: range[1] });
     say();
   };
@@ -101,7 +119,8 @@ if (live && data.torque.length && window.uPlot) {
   show(select.value);
   new ResizeObserver(() => {
     if (box.clientWidth && Math.abs(box.clientWidth - chart.width) > 1) {
-      chart.setSize({ width: box.clientWidth, height: Math.max(200, Math.min(300, box.clientWidth * 0.4)) });
+      chart.setSize({ width: box.clientWidth, height: tall() });
+      errors.setSize({ width: box.clientWidth, height: low() });
     }
   }).observe(box);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", make);

@@ -3,11 +3,11 @@
 use crate::cli::{Diagnose, Input};
 use crate::input::{Loaded, load_any};
 use crate::report::Setting;
+use crate::report::terminal::Paint;
 use crate::{output, report, servo, summary};
 use anyhow::{Context, Result};
 use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, diagnose};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
 use std::path::Path;
 
 /// Diagnoses and writes the results; returns what to print.
@@ -17,7 +17,7 @@ use std::path::Path;
 pub fn run(args: &Diagnose) -> Result<String> {
     let first = args.input.logs.first().context("no log is given")?;
     let out = output::folder(args.out.as_deref(), first, args.force)?;
-    let progress = Progress::new();
+    let progress = Progress::new(args.quiet);
     progress.stage("reading robot and logs", 0.0);
     let loaded = load_any(&args.input)?;
     if servo::lacks_effort(&loaded) {
@@ -27,8 +27,13 @@ pub fn run(args: &Diagnose) -> Result<String> {
     }
     let (outcome, setting) = diagnosed(loaded, &args.input, &progress)?;
     write(&outcome, &setting, &out)?;
-    let color = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    let mut text = summary::summary(&outcome.diagnosis, Some(&out.join("report.html")), color);
+    if args.json {
+        return Ok(serde_json::to_string(&outcome.diagnosis)?);
+    }
+    if args.quiet {
+        return Ok(summary::answer(&outcome.diagnosis, &Paint::here()));
+    }
+    let mut text = summary::summary(&outcome.diagnosis, Some(&out.join("report.html")), &Paint::here());
     if args.why {
         text += &summary::why(&outcome.diagnosis);
     }
@@ -40,7 +45,7 @@ pub fn run(args: &Diagnose) -> Result<String> {
 /// # Errors
 /// None that a log can cause.
 pub fn with_progress(loaded: Loaded, input: &Input) -> Result<(Outcome, Setting)> {
-    diagnosed(loaded, input, &Progress::new())
+    diagnosed(loaded, input, &Progress::new(false))
 }
 
 fn diagnosed(loaded: Loaded, input: &Input, progress: &Progress) -> Result<(Outcome, Setting)> {
@@ -80,16 +85,17 @@ pub fn write(outcome: &Outcome, setting: &Setting, out: &Path) -> Result<()> {
 struct Progress(ProgressBar);
 
 impl Progress {
-    fn new() -> Progress {
-        let bar = ProgressBar::new(100);
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}") {
+    fn new(quiet: bool) -> Progress {
+        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(100) };
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  about {eta} left  {msg}") {
             bar.set_style(style);
         }
         Progress(bar)
     }
 
+    /// Never goes back: a stage that is entered again, where the search takes turns, leaves the bar where it is.
     fn stage(&self, stage: &str, part: f64) {
-        self.0.set_position((100.0 * part) as u64);
+        self.0.set_position(self.0.position().max((100.0 * part) as u64));
         self.0.set_message(stage.to_owned());
     }
 

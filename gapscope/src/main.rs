@@ -16,6 +16,7 @@ mod report;
 mod robot;
 mod rollout;
 mod servo;
+mod shell;
 mod study;
 mod summary;
 mod train;
@@ -31,6 +32,8 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Completions(args) => shell::completions(&args),
+        Command::Man(args) => shell::manual(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Study(study) => study::run(&study),

@@ -3,7 +3,7 @@
 use crate::cli::{Diagnose, Evaluate};
 use crate::input::Loaded;
 use crate::output;
-use crate::report::joint_list;
+use crate::report::{capital, joint_list};
 use anyhow::{Context, Result, bail};
 use gapscope_servo::schema::{Change, Diagnosis, Estimate, Evaluation, FoundDrive, FoundEffect};
 use gapscope_servo::{Given, ServoModel};
@@ -37,6 +37,17 @@ pub fn diagnose(args: &Diagnose, loaded: Loaded, out: &Path, progress: &(dyn Fn(
     output::write(&out.join("corrected.json"), &serde_json::to_string_pretty(&outcome.corrected)?)?;
     // A report of an earlier diagnosis in this folder would be of something else.
     output::remove(&out.join("report.html"))?;
+    if args.json {
+        return Ok(serde_json::to_string(&outcome.diagnosis)?);
+    }
+    if args.quiet {
+        let found = &outcome.diagnosis;
+        return Ok(format!(
+            "{}\nHeld out, free run under the set points: {}.",
+            capital(&headline(found)),
+            change(&found.shrink.position)
+        ));
+    }
     let mut text = summary(&outcome.diagnosis, out);
     if args.why {
         text += &why(&outcome.diagnosis);

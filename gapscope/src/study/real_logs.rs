@@ -6,6 +6,7 @@ mod published;
 use crate::cli::{Input, RealLogs};
 use crate::diagnose::with_progress;
 use crate::input::load;
+use crate::report::terminal::Paint;
 use crate::report::{heatmap_picture, series_picture};
 use crate::{output, summary};
 use anyhow::{Context, Result, bail};
@@ -75,7 +76,7 @@ fn write(folder: &Path, log: &Log, out: &Path) -> Result<String> {
         }
     }
     output::write(&page, &markdown(log, &outcome, &others, names.each_ref().map(|name| name.as_deref())))?;
-    Ok(summary::summary(diagnosis, None, false))
+    Ok(summary::summary(diagnosis, None, &Paint::plain()))
 }
 
 /// Page and pictures of a log.

@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::index::Report;
 use crate::shell::{Completions, Manual};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gapscope_datasets::{ReferenceKind, Servo};
@@ -35,6 +36,8 @@ pub enum Command {
     Evaluate(Evaluate),
     /// Write the corrected model for a simulator, with a ledger of what it holds there
     Export(Export),
+    /// Put all diagnoses below a folder on one page, to sort, filter and compare
+    Report(Report),
     /// Look at logs: rate, gaps, jitter, steps and motion of each joint; with the robot also faults and what they determine
     Inspect(Inspect),
     /// Show how the model's error grows over the horizon, beside what one-step errors and Jacobians allow

@@ -7,6 +7,7 @@ mod diagnose;
 mod evaluate;
 mod export;
 mod generate;
+mod index;
 mod input;
 mod inspect;
 mod learned;
@@ -32,6 +33,7 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Report(args) => index::run(&args),
         Command::Completions(args) => shell::completions(&args),
         Command::Man(args) => shell::manual(&args),
         Command::Inspect(args) => inspect::run(&args),

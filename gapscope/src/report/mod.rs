@@ -10,6 +10,7 @@ mod curves;
 mod effects;
 mod format;
 mod heatmap;
+mod index;
 mod joints;
 mod packed;
 mod paste;
@@ -45,6 +46,7 @@ pub use format::{
     significant, span, with_unit,
 };
 pub use heatmap::picture as heatmap_picture;
+pub use index::{Entry, Found, page as index_page};
 pub use power::line as power_line;
 pub use rest::sentence as sentence_of_the_rest;
 pub use rollout::page as rollout_page;

@@ -4,6 +4,7 @@
 mod bad_input;
 mod commands;
 mod formats;
+mod report;
 mod rollout;
 mod support;
 mod train;

@@ -184,7 +184,11 @@ fn which(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
     let (first, second) = (column(names.iter().map(String::as_str), 28), column(places.iter().map(String::as_str), 34));
     let mut rows = vec![];
     for ((found, name), place) in shown.iter().zip(&names).zip(&places) {
-        let alone = found.shrink.torque.map_or(String::new(), |s| format!(", alone shrinks the gap by {}", percent(s)));
+        let alone = match found.shrink.torque {
+            Some(s) if s < 0.0 => format!(", alone grows the gap by {}", percent(-s)),
+            Some(s) => format!(", alone shrinks the gap by {}", percent(s)),
+            None => String::new(),
+        };
         let line = format!("{}  {:>4} % sure{alone}", pad(place, second), probability_figure(found.confidence));
         let details: Vec<String> =
             found.parameters.iter().filter_map(|(name, p)| value(&found.kind, name, p)).collect();

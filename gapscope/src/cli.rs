@@ -1,5 +1,7 @@
 //! The command line.
 
+use crate::index::Report;
+use crate::shell::{Completions, Manual};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gapscope_datasets::{ReferenceKind, Servo};
 use gapscope_residual::On;
@@ -7,7 +9,18 @@ use std::path::PathBuf;
 
 /// Where a robot's simulator drifts from the robot, which effect causes it, and how far it shrinks.
 #[derive(Debug, Parser)]
-#[command(name = "gapscope", version, about, max_term_width = 100)]
+#[command(
+    name = "gapscope",
+    version,
+    about,
+    max_term_width = 100,
+    after_help = "Examples:
+  gapscope demo                                       see it work on a built-in arm
+  gapscope diagnose robot.urdf run1.csv run2.csv      your robot: writes a folder with report.html
+  gapscope evaluate robot.urdf other.csv --with run1.gapscope/corrected.json
+  gapscope export run1.gapscope --robot robot.urdf --to urdf,mjcf
+  gapscope report runs                                one page over all diagnoses below a folder"
+)]
 pub struct Cli {
     /// What to do
     #[command(subcommand)]
@@ -23,6 +36,8 @@ pub enum Command {
     Evaluate(Evaluate),
     /// Write the corrected model for a simulator, with a ledger of what it holds there
     Export(Export),
+    /// Put all diagnoses below a folder on one page, to sort, filter and compare
+    Report(Report),
     /// Look at logs: rate, gaps, jitter, steps and motion of each joint; with the robot also faults and what they determine
     Inspect(Inspect),
     /// Show how the model's error grows over the horizon, beside what one-step errors and Jacobians allow
@@ -39,6 +54,10 @@ pub enum Command {
     /// Make cases with a sealed effect, and score how well it is found
     #[command(subcommand)]
     Withheld(Withheld),
+    /// Print what a shell needs to complete commands and flags
+    Completions(Completions),
+    /// Print the manual page, or write one for each command
+    Man(Manual),
 }
 
 /// What to do with withheld cases.
@@ -95,6 +114,11 @@ pub struct Input {
 
 /// Arguments of `diagnose`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope diagnose robot.urdf run1.csv run2.csv.gz
+  gapscope diagnose robot.urdf bag/ --topic /joint_states --out first
+  gapscope diagnose robot.urdf run.csv --map position.joint1=q1 --map effort.joint1=tau1
+  gapscope diagnose robot.urdf run_*.csv --quiet          three sentences, for a script or a chat")]
 pub struct Diagnose {
     /// Robot and logs
     #[command(flatten)]
@@ -111,6 +135,12 @@ pub struct Diagnose {
     /// Print what was proposed, against what, and by how much the logs spoke for or against it
     #[arg(long)]
     pub why: bool,
+    /// Print the answer in three sentences and nothing else, without progress
+    #[arg(long, short, conflicts_with_all = ["why", "json"])]
+    pub quiet: bool,
+    /// Print diagnosis.json, as it is written beside, and nothing else
+    #[arg(long, conflicts_with = "why")]
+    pub json: bool,
 }
 
 /// Arguments of `inspect`.
@@ -144,6 +174,10 @@ pub struct Inspect {
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope evaluate robot.urdf other.csv                                          the model as described
+  gapscope evaluate robot.urdf other.csv --with run1.gapscope/corrected.json      and with what was found
+  gapscope evaluate robot.urdf other.csv --with run1.gapscope/corrected.json --predictions predictions.csv")]
 pub struct Evaluate {
     /// Robot and logs
     #[command(flatten)]

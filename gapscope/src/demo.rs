@@ -3,6 +3,7 @@
 use crate::cli::{Demo, Input};
 use crate::diagnose::{with_progress, write};
 use crate::input::load;
+use crate::report::terminal::Paint;
 use crate::{output, summary};
 use anyhow::{Context, Result};
 use gapscope_datasets::{Recipe, generate, write_csv};
@@ -15,7 +16,6 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::io::IsTerminal;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -50,15 +50,12 @@ pub fn run(args: &Demo) -> Result<String> {
         logs.push(path);
     }
     // From here on only the files count: the diagnosis reads what a user's robot would have left.
-    let input = Input { robot: urdf.clone(), logs: logs.clone(), ..Input::default() };
-    let mut outcome = with_progress(load(&input)?)?;
-    outcome.evidence.robot_file = urdf.display().to_string();
-    outcome.evidence.logs = logs.iter().map(|l| l.display().to_string()).collect();
-    write(&outcome, &out)?;
-    let color = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let input = Input { robot: urdf, logs, ..Input::default() };
+    let (outcome, setting) = with_progress(load(&input)?, &input)?;
+    write(&outcome, &setting, &out)?;
     let mut text =
         format!("A 7-joint arm moves with an effect that its model lacks; its logs are in {}.\n\n", out.display());
-    text.push_str(&summary::summary(&outcome.diagnosis, Some(&out.join("report.html")), color));
+    text.push_str(&summary::summary(&outcome.diagnosis, Some(&out.join("report.html")), &Paint::here()));
     let _ = write!(text, "\nWithheld until now (gapscope demo --seed {seed}):\n{}", reveal(&withheld));
     Ok(text)
 }

@@ -1,13 +1,14 @@
 //! `gapscope diagnose`.
 
-use crate::cli::Diagnose;
+use crate::cli::{Diagnose, Input};
 use crate::input::{Loaded, load_any};
+use crate::report::Setting;
+use crate::report::terminal::Paint;
 use crate::{output, report, servo, summary};
 use anyhow::{Context, Result};
 use gapscope_diagnosis::schema::Evidence;
 use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, Progress as Told, diagnose};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
 use std::path::Path;
 
 /// Diagnoses and writes the results; returns what to print.
@@ -17,12 +18,17 @@ use std::path::Path;
 pub fn run(args: &Diagnose) -> Result<String> {
     let first = args.input.logs.first().context("no log is given")?;
     let out = output::folder(args.out.as_deref(), first, args.force)?;
-    let progress = Progress::new();
+    let progress = Progress::new(args.quiet);
     let found = found(args, &|stage, part| progress.stage(stage, part))?;
     progress.finish();
     output::write_all(&out, &found.files(&out)?)?;
-    let color = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    let mut text = found.summary(Some(&out), color);
+    if args.json {
+        return found.json();
+    }
+    if args.quiet {
+        return Ok(found.answer(&Paint::here()));
+    }
+    let mut text = found.summary(Some(&out), &Paint::here());
     if args.why {
         text += &found.why();
     }
@@ -33,7 +39,7 @@ pub fn run(args: &Diagnose) -> Result<String> {
 #[derive(Debug)]
 pub enum Found {
     /// Of a robot whose logs hold its torque.
-    Torque(Box<Outcome>),
+    Torque(Box<Outcome>, Box<Setting>),
     /// Of a servo arm whose logs do not.
     Servo(Box<gapscope_servo::Outcome>),
 }
@@ -48,10 +54,8 @@ pub fn found(args: &Diagnose, progress: Told<'_>) -> Result<Found> {
     if servo::lacks_effort(&loaded) {
         return Ok(Found::Servo(Box::new(servo::diagnosed(args, loaded, progress)?)));
     }
-    let mut outcome = diagnosed(loaded, progress)?;
-    outcome.evidence.robot_file = args.input.robot.display().to_string();
-    outcome.evidence.logs = args.input.logs.iter().map(|l| l.display().to_string()).collect();
-    Ok(Found::Torque(Box::new(outcome)))
+    let (outcome, setting) = diagnosed(loaded, &args.input, progress)?;
+    Ok(Found::Torque(Box::new(outcome), Box::new(setting)))
 }
 
 impl Found {
@@ -61,25 +65,49 @@ impl Found {
     /// Numbers that JSON cannot hold.
     pub fn files(&self, out: &Path) -> Result<Vec<(&'static str, Option<String>)>> {
         match self {
-            Found::Torque(outcome) => files(outcome, out),
+            Found::Torque(outcome, setting) => files(outcome, setting, out),
             Found::Servo(outcome) => servo::files(outcome),
         }
     }
 
-    /// The answer in some lines for the terminal.
-    pub fn summary(&self, out: Option<&Path>, color: bool) -> String {
+    /// The text of diagnosis.json in one line.
+    ///
+    /// # Errors
+    /// Numbers that JSON cannot hold.
+    pub fn json(&self) -> Result<String> {
+        Ok(match self {
+            Found::Torque(outcome, _) => serde_json::to_string(&outcome.diagnosis)?,
+            Found::Servo(outcome) => serde_json::to_string(&outcome.diagnosis)?,
+        })
+    }
+
+    /// The answer alone, without figures.
+    pub fn answer(&self, paint: &Paint) -> String {
         match self {
-            Found::Torque(outcome) => {
-                summary::summary(&outcome.diagnosis, out.map(|out| out.join("report.html")).as_deref(), color)
+            Found::Torque(outcome, _) => summary::answer(&outcome.diagnosis, paint),
+            Found::Servo(outcome) => servo::answer(&outcome.diagnosis),
+        }
+    }
+
+    /// The answer in some lines, as wide and colourful as where it is written.
+    pub fn summary(&self, out: Option<&Path>, paint: &Paint) -> String {
+        match self {
+            Found::Torque(outcome, _) => {
+                summary::summary(&outcome.diagnosis, out.map(|out| out.join("report.html")).as_deref(), paint)
             }
             Found::Servo(outcome) => servo::summary(&outcome.diagnosis, out),
         }
     }
 
+    /// The same in plain text, without a folder.
+    pub fn text(&self) -> String {
+        self.summary(None, &Paint::plain())
+    }
+
     /// The comparisons that decided, a line each.
     pub fn why(&self) -> String {
         match self {
-            Found::Torque(outcome) => summary::why(&outcome.diagnosis),
+            Found::Torque(outcome, _) => summary::why(&outcome.diagnosis),
             Found::Servo(outcome) => servo::why(&outcome.diagnosis),
         }
     }
@@ -87,7 +115,7 @@ impl Found {
     /// Which, where and how far, a sentence each.
     pub fn sentences(&self) -> [String; 3] {
         match self {
-            Found::Torque(outcome) => {
+            Found::Torque(outcome, _) => {
                 let [place, which, how_far] = report::answer_sentences(&outcome.diagnosis, &outcome.evidence);
                 [which, place, how_far]
             }
@@ -109,35 +137,39 @@ pub fn sentences(text: &str) -> Result<[String; 3]> {
     Ok([which, place, how_far])
 }
 
-/// Diagnoses what is loaded, with progress on the terminal.
+/// Diagnoses what is loaded, with progress on the terminal; beside it what the report says of robot and files.
 ///
 /// # Errors
 /// None that a log can cause.
-pub fn with_progress(loaded: Loaded) -> Result<Outcome> {
-    let progress = Progress::new();
-    let outcome = diagnosed(loaded, &|stage, part| progress.stage(stage, part));
+pub fn with_progress(loaded: Loaded, input: &Input) -> Result<(Outcome, Setting)> {
+    let progress = Progress::new(false);
+    let found = diagnosed(loaded, input, &|stage, part| progress.stage(stage, part));
     progress.finish();
-    outcome
+    found
 }
 
-fn diagnosed(loaded: Loaded, progress: Told<'_>) -> Result<Outcome> {
-    let Loaded { model, episodes, findings, faults, doubts, origin } = loaded;
+fn diagnosed(loaded: Loaded, input: &Input, progress: Told<'_>) -> Result<(Outcome, Setting)> {
+    let Loaded { model, episodes, findings, faults, doubts, origin, description, held } = loaded;
     let mut outcome = diagnose(&model, &episodes, findings, progress)?;
     outcome.within_physics(&model);
     outcome.under(faults, doubts);
     outcome.corrected.made_from = Some(origin);
-    Ok(outcome)
+    outcome.evidence.robot_file = input.robot.display().to_string();
+    outcome.evidence.logs = input.logs.iter().map(|l| l.display().to_string()).collect();
+    let described = description.model(&input.robot, &held).ok();
+    let setting = Setting::new(&model, &episodes, &outcome.corrected, &description, described.as_ref());
+    Ok((outcome, setting))
 }
 
 /// Writes diagnosis.json, corrected.json, report.html and, where one is proposed, the next motion into a folder.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write(outcome: &Outcome, out: &Path) -> Result<()> {
-    output::write_all(out, &files(outcome, out)?)
+pub fn write(outcome: &Outcome, setting: &Setting, out: &Path) -> Result<()> {
+    output::write_all(out, &files(outcome, setting, out)?)
 }
 
-fn files(outcome: &Outcome, out: &Path) -> Result<Vec<(&'static str, Option<String>)>> {
+fn files(outcome: &Outcome, setting: &Setting, out: &Path) -> Result<Vec<(&'static str, Option<String>)>> {
     let proposed = outcome.diagnosis.next_experiment.as_ref().and_then(|next| next.trajectory.as_ref());
     let motion = proposed.zip(outcome.trajectory.as_ref()).map(|(_, trajectory)| trajectory.to_csv());
     let mut evidence = outcome.evidence.clone();
@@ -145,7 +177,7 @@ fn files(outcome: &Outcome, out: &Path) -> Result<Vec<(&'static str, Option<Stri
     Ok(vec![
         ("diagnosis.json", Some(serde_json::to_string_pretty(&outcome.diagnosis)?)),
         ("corrected.json", Some(outcome.corrected.to_json()?)),
-        ("report.html", Some(report::html(&outcome.diagnosis, &evidence))),
+        ("report.html", Some(report::html(&outcome.diagnosis, &evidence, setting))),
         // The advice of an earlier diagnosis in this folder is out of date.
         (NEXT_EXPERIMENT, motion),
     ])
@@ -155,16 +187,17 @@ fn files(outcome: &Outcome, out: &Path) -> Result<Vec<(&'static str, Option<Stri
 struct Progress(ProgressBar);
 
 impl Progress {
-    fn new() -> Progress {
-        let bar = ProgressBar::new(100);
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}") {
+    fn new(quiet: bool) -> Progress {
+        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(100) };
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  about {eta} left  {msg}") {
             bar.set_style(style);
         }
         Progress(bar)
     }
 
+    /// Never goes back: a stage that is entered again, where the search takes turns, leaves the bar where it is.
     fn stage(&self, stage: &str, part: f64) {
-        self.0.set_position((100.0 * part) as u64);
+        self.0.set_position(self.0.position().max((100.0 * part) as u64));
         self.0.set_message(stage.to_owned());
     }
 

@@ -270,7 +270,7 @@ mod tests {
         let [results, logs] = ["results", "logs"].map(|name| dir.path().join(name));
         let model = robots::model("double_pendulum").unwrap().unwrap().model;
         let outcome = gapscope_diagnosis::diagnose(&model, &[], vec![], &|_, _| {}).unwrap();
-        crate::diagnose::write(&outcome, &results).unwrap();
+        crate::diagnose::write(&outcome, &Default::default(), &results).unwrap();
         let file = results.join("next_experiment.csv");
         let line = format!("double_pendulum --episodes 1 --trajectory {}", file.display());
         let told = generated(&line, &logs).unwrap();
@@ -286,7 +286,7 @@ mod tests {
         // Nothing is proposed any more: the file of before would mislead.
         let mut settled = outcome;
         (settled.diagnosis.next_experiment, settled.trajectory) = (None, None);
-        crate::diagnose::write(&settled, &results).unwrap();
+        crate::diagnose::write(&settled, &Default::default(), &results).unwrap();
         assert!(!file.exists());
         std::fs::write(&file, "time,position.joint1\n0,1\n").unwrap();
         let said = format!("{:#}", generated(&line, &dir.path().join("none")).unwrap_err());

@@ -1,7 +1,7 @@
 //! Robot and logs from the command line.
 
 use crate::cli::Input;
-use crate::robot;
+use crate::robot::{self, Description};
 use anyhow::{Context, Result, bail};
 use gapscope_datasets::{
     Calibration, ColumnMap, Doubt, Episode, Fault, Faults, LONGEST_STEP, LogError, ReadOptions, check_logs, digest,
@@ -25,6 +25,10 @@ pub struct Loaded {
     pub doubts: Vec<Doubt>,
     /// Digests of the files.
     pub origin: Origin,
+    /// The robot description.
+    pub description: Description,
+    /// Joints that are held at zero.
+    pub held: Vec<String>,
 }
 
 impl Loaded {
@@ -103,7 +107,7 @@ fn load_with(input: &Input, options: ReadOptions) -> Result<Loaded> {
         };
         said.extend(notes);
         said.extend(robot.findings);
-        return checked(input, robot.model, episodes, said);
+        return checked(input, (description, locked), robot.model, episodes, said);
     }
 }
 
@@ -123,7 +127,13 @@ pub(crate) fn read(
 }
 
 /// Holds the logs against themselves and the model, and undoes what is wrong with them beyond doubt.
-fn checked(input: &Input, model: Model, episodes: Vec<Episode>, said: Vec<Finding>) -> Result<Loaded> {
+fn checked(
+    input: &Input,
+    (description, held): (Description, Vec<String>),
+    model: Model,
+    episodes: Vec<Episode>,
+    said: Vec<Finding>,
+) -> Result<Loaded> {
     // What is told by the torque that the robot takes has nothing to hold it against without one.
     let told = episodes.iter().all(Episode::has_effort);
     let mut found = if told { find_faults(&model, &episodes) } else { Faults::default() };
@@ -150,7 +160,16 @@ fn checked(input: &Input, model: Model, episodes: Vec<Episode>, said: Vec<Findin
     // What is held against the model weighs most, what the reader of the robot passed over least.
     let checks = check_logs(&model, &episodes);
     let findings = checks.iter().chain(&said).map(ToString::to_string).collect();
-    Ok(Loaded { model, episodes, findings, faults: found.faults, doubts: found.doubts, origin: origin(input)? })
+    Ok(Loaded {
+        model,
+        episodes,
+        findings,
+        faults: found.faults,
+        doubts: found.doubts,
+        origin: origin(input)?,
+        description,
+        held,
+    })
 }
 
 /// How the logs are to be read.

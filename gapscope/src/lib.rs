@@ -8,6 +8,7 @@ pub mod diagnose;
 pub mod evaluate;
 mod export;
 pub mod generate;
+mod index;
 pub mod input;
 pub mod inspect;
 pub mod learned;
@@ -17,6 +18,7 @@ mod report;
 pub mod robot;
 pub mod rollout;
 mod servo;
+mod shell;
 mod study;
 mod summary;
 pub mod train;
@@ -33,6 +35,9 @@ pub fn run(command: &Command) -> anyhow::Result<String> {
         Command::Diagnose(args) => diagnose::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Export(args) => export::run(args),
+        Command::Report(args) => index::run(args),
+        Command::Completions(args) => shell::completions(args),
+        Command::Man(args) => shell::manual(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Rollout(args) => rollout::run(args),
         Command::Study(study) => study::run(study),

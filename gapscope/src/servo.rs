@@ -2,7 +2,7 @@
 
 use crate::cli::{Diagnose, Evaluate};
 use crate::input::Loaded;
-use crate::report::joint_list;
+use crate::report::{capital, joint_list};
 use anyhow::{Context, Result, bail};
 use gapscope_servo::schema::{Change, Diagnosis, Estimate, Evaluation, FoundDrive, FoundEffect};
 use gapscope_servo::{Given, Outcome, Paths, ServoModel};
@@ -45,6 +45,12 @@ pub fn files(outcome: &Outcome) -> Result<Vec<(&'static str, Option<String>)>> {
         // A report of an earlier diagnosis in this folder would be of something else.
         ("report.html", None),
     ])
+}
+
+/// The answer alone: what it is and how far it shrinks.
+pub fn answer(diagnosis: &Diagnosis) -> String {
+    let far = change(&diagnosis.shrink.position);
+    format!("{}\nHeld out, free run under the set points: {far}.", capital(&headline(diagnosis)))
 }
 
 /// Which, where and how far, a sentence each.

@@ -1,15 +1,17 @@
-//! The diagnosis and the evaluation as a few lines for the terminal, at most a hundred columns wide.
+//! The diagnosis and the evaluation as a few lines for the terminal, within its width: the answer in three sentences, then
+//! what could make it wrong, then the figures.
 
 mod change;
 
 use crate::input::fault_line;
-use crate::report::terminal::{INDENT, Paint, WIDTH, block, blocks, column, cut, cut_to, fill, pad, wrap};
+use crate::report::plain;
+use crate::report::terminal::{INDENT, Paint, block, blocks, clean, column, fill, pad, wrap};
 use crate::report::{
     NONE, capital, changed, count, effect, estimate, figure, headline, implied_unit, interval, is_above_floor,
-    joint_list, largest, motion_unit, outstanding, percent, percent_figure, plain, power_line, probability_figure,
-    regime, said_of, significant, span, verdict, with_unit, words_of_the_rest,
+    joint_list, largest, motion_unit, outstanding, percent, percent_figure, plain as rounded, power_line,
+    probability_figure, regime, said_of, significant, span, verdict, with_unit, words_of_the_rest,
 };
-use change::{Cells, change_sign};
+use change::Cells;
 use gapscope_diagnosis::schema::{
     Diagnosis, Estimate, Evaluation, FoundEffect, Parameter, Regime, Shrink, Verdict, Why,
 };
@@ -23,54 +25,80 @@ const FINDINGS: usize = 3;
 const LOGS: usize = 12;
 /// A rollout further than this from its log, rad or m, goes nowhere.
 const LOST: f64 = 1e3;
-/// Lines that a fault, a doubt or a finding takes at most.
-const LINES: usize = 30;
 
-/// The diagnosis in at most some 25 lines: verdict, which, where, how far, notes, and where the report is.
-pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, color: bool) -> String {
-    let paint = Paint { color };
+/// The three sentences of the answer, and nothing else.
+pub fn answer(diagnosis: &Diagnosis, paint: &Paint) -> String {
+    ordinary_spaces(&told(diagnosis, paint))
+}
+
+fn told(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
+    let mut lines = vec![];
+    for (i, line) in plain::answer(diagnosis).iter().enumerate() {
+        let wrapped = wrap(&clean(line), paint.width);
+        lines.extend(wrapped.into_iter().map(|l| if i == 0 { paint.verdict(&l, diagnosis.verdict) } else { l }));
+    }
+    lines
+}
+
+/// The diagnosis in some 25 lines: the answer, faults and ties, which, where, how far, notes, and where the report is.
+pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> String {
     let data = &diagnosis.data;
-    let mut lines = vec![cut(&format!(
+    let mut lines = told(diagnosis, paint);
+    lines.push(String::new());
+    let of = format!(
         "{} · {}, {}, {} at {}",
         diagnosis.robot,
         count(diagnosis.joints.len(), "joint"),
         count(data.episodes, "episode"),
-        with_unit(&plain(data.duration), "s"),
-        with_unit(&plain(data.rate), "Hz")
-    ))];
+        with_unit(&rounded(data.duration), "s"),
+        with_unit(&rounded(data.rate), "Hz")
+    );
+    lines.extend(wrap(&clean(&of), paint.width));
     for fault in &data.faults {
-        block(&mut lines, &paint, "Fault", &wrap(&fault_line(fault), LINES));
+        block(&mut lines, paint, "Fault", &[clean(&fault_line(fault))]);
     }
     for doubt in &data.doubts {
-        block(&mut lines, &paint, "In doubt", &wrap(&capital(&doubt.question), LINES));
+        block(&mut lines, paint, "In doubt", &[clean(&capital(&doubt.question))]);
     }
+    block(&mut lines, paint, "Ties", &ties(diagnosis));
     let label = verdict(diagnosis.verdict).to_uppercase();
     let mended = data.faults.iter().any(|fault| fault.mended);
     let of = if mended { "Of the mended logs: " } else { "" };
-    lines.push(format!("{}  {of}{}", paint.verdict(&label, diagnosis.verdict), headline(diagnosis)));
+    let head = format!("{}  {of}{}", paint.verdict(&label, diagnosis.verdict), headline(diagnosis));
+    lines.extend(wrap(&head, paint.width));
     lines.push(String::new());
     if diagnosis.verdict != Verdict::NotExcited {
-        block(&mut lines, &paint, "Which", &which(diagnosis, &paint));
-        block(&mut lines, &paint, "Where", &places(diagnosis));
+        block(&mut lines, paint, "Which", &which(diagnosis, paint));
+        block(&mut lines, paint, "Where", &places(diagnosis));
         block(
             &mut lines,
-            &paint,
+            paint,
             "How far",
             &how_far(&diagnosis.shrink, &diagnosis.gap.regimes, !diagnosis.effects.is_empty()),
         );
     }
-    block(&mut lines, &paint, "Notes", &notes(diagnosis, color));
+    block(&mut lines, paint, "Notes", &notes(diagnosis, paint.terminal));
     if let (Verdict::NoGap, Some(line)) = (diagnosis.verdict, power_line(&diagnosis.power)) {
-        block(&mut lines, &paint, "Power", &wrap(&line, 2));
+        block(&mut lines, paint, "Power", &[line]);
     }
     if let Some(next) = &diagnosis.next_experiment {
-        block(&mut lines, &paint, "Next", &wrap(&next.motion, 2));
+        block(&mut lines, paint, "Next", &[clean(&next.motion)]);
     }
     let mut text = ordinary_spaces(&lines);
     if let Some(out) = out {
         text += &format!("{} {}\n", paint.head(&pad("Report", INDENT - 1)), out.display());
     }
     text
+}
+
+/// What the logs cannot tell apart, a line each.
+fn ties(diagnosis: &Diagnosis) -> Vec<String> {
+    let tied = diagnosis.effects.iter().filter(|found| !found.indistinguishable_from.is_empty());
+    tied.map(|found| {
+        let kinds: Vec<String> = found.indistinguishable_from.iter().map(|kind| effect(kind)).collect();
+        clean(&format!("{} could also be {}", effect(&found.kind), kinds.join(" or ")))
+    })
+    .collect()
 }
 
 /// What was proposed, against what, and by how much the logs spoke for it or against it: one line a comparison.
@@ -92,10 +120,10 @@ pub fn why(diagnosis: &Diagnosis) -> String {
 
 /// The evaluation in a few lines: the gap over all logs, before and after, then log by log.
 pub fn evaluation_summary(evaluation: &Evaluation) -> String {
-    let paint = Paint { color: false };
+    let paint = &Paint::plain();
     let mut lines = vec![];
     if let Some(shrink) = &evaluation.shrink {
-        block(&mut lines, &paint, "How far", &how_far(shrink, &evaluation.gap.regimes, true));
+        block(&mut lines, paint, "How far", &how_far(shrink, &evaluation.gap.regimes, true));
     }
     let torque = &evaluation.gap.torque;
     let mut joints: Vec<(&String, f64)> = torque.rms.iter().map(|(joint, &rms)| (joint, rms)).collect();
@@ -113,7 +141,7 @@ pub fn evaluation_summary(evaluation: &Evaluation) -> String {
             format!("{}  {}  torque gap {} rms{floor}", pad(joint, width), blocks(rms / top, 10), fill(&rms_text, 9))
         })
         .collect();
-    block(&mut lines, &paint, "Where", &rest(rows, joints.len(), LOGS, "joint"));
+    block(&mut lines, paint, "Where", &rest(rows, joints.len(), LOGS, "joint"));
     let width = column(evaluation.logs.iter().map(|log| log.log.as_str()), 44);
     let rows: Vec<String> = evaluation
         .logs
@@ -130,7 +158,7 @@ pub fn evaluation_summary(evaluation: &Evaluation) -> String {
             format!("{}  {text}", pad(&log.log, width))
         })
         .collect();
-    block(&mut lines, &paint, "Logs", &rest(rows, evaluation.logs.len(), LOGS, "log"));
+    block(&mut lines, paint, "Logs", &rest(rows, evaluation.logs.len(), LOGS, "log"));
     ordinary_spaces(&lines)
 }
 
@@ -156,22 +184,22 @@ fn which(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
     let (first, second) = (column(names.iter().map(String::as_str), 28), column(places.iter().map(String::as_str), 34));
     let mut rows = vec![];
     for ((found, name), place) in shown.iter().zip(&names).zip(&places) {
-        let alone = found.shrink.torque.map_or(String::new(), |s| format!(", alone {}", change_sign(s)));
+        let alone = match found.shrink.torque {
+            Some(s) if s < 0.0 => format!(", alone grows the gap by {}", percent(-s)),
+            Some(s) => format!(", alone shrinks the gap by {}", percent(s)),
+            None => String::new(),
+        };
         let line = format!("{}  {:>4} % sure{alone}", pad(place, second), probability_figure(found.confidence));
-        let mut details: Vec<String> =
+        let details: Vec<String> =
             found.parameters.iter().filter_map(|(name, p)| value(&found.kind, name, p)).collect();
-        if !found.indistinguishable_from.is_empty() {
-            let kinds: Vec<String> = found.indistinguishable_from.iter().map(|kind| effect(kind)).collect();
-            details.push(format!("could also be {}", kinds.join(" or ")));
-        }
         let details = details.join("; ");
         let columns = INDENT + first + 4 + line.chars().count();
         let name = paint.bold(&pad(name, first));
-        if columns + details.chars().count() <= WIDTH {
+        if columns + details.chars().count() <= paint.width {
             rows.push(format!("{name}  {line}  {details}"));
         } else {
             rows.push(format!("{name}  {line}"));
-            rows.extend(wrap(&details, 2).iter().map(|line| format!("  {line}")));
+            rows.push(format!("  {details}"));
         }
     }
     rest(rows, diagnosis.effects.len(), EFFECTS, "effect")
@@ -222,7 +250,7 @@ fn places(diagnosis: &Diagnosis) -> Vec<String> {
         let floor =
             floor.map_or(String::new(), |f| format!("; noise alone gives {}", with_unit(&significant(*f, 2), unit)));
         let rms = with_unit(&figure(rms), unit);
-        rows.push(cut_to(&format!("largest at {joint}: torque gap {rms} rms{floor}"), WIDTH - INDENT));
+        rows.push(clean(&format!("largest at {joint}: torque gap {rms} rms{floor}")));
     }
     if diagnosis.verdict == Verdict::NoGap {
         return rows;
@@ -274,7 +302,7 @@ fn how_far(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Vec<String> 
     let shown: Vec<usize> = if n <= 3 { (0..n).collect() } else { vec![0, n / 2, n - 1] };
     for h in shown.into_iter().filter_map(|i| shrink.rollout.get(i)).filter(|h| changed(&h.change)) {
         cells.push((
-            format!("rollout {} s", plain(h.horizon)),
+            format!("rollout {} s", rounded(h.horizon)),
             Cells::of(&h.change, rolled_out),
             format!("   {} rms", motion_unit(regimes, false)),
         ));
@@ -302,13 +330,13 @@ fn notes(diagnosis: &Diagnosis, terminal: bool) -> Vec<String> {
     if let Some(other) = best.filter(|a| a.probability >= 0.05) {
         let kinds: Vec<String> = other.effects.iter().map(|kind| effect(kind)).collect();
         let kinds = if kinds.is_empty() { "no effect at all".into() } else { kinds.join(" + ") };
-        rows.push(cut_to(&format!("or {kinds} ({})", percent(other.probability)), WIDTH - INDENT));
+        rows.push(clean(&format!("or {kinds} ({})", percent(other.probability))));
     }
     if matches!(diagnosis.verdict, Verdict::PartlyExplained | Verdict::UnknownEffect) {
-        rows.extend(wrap(&words_of_the_rest(&diagnosis.unexplained, &diagnosis.joints), 2));
+        rows.push(clean(&words_of_the_rest(&diagnosis.unexplained, &diagnosis.joints)));
     }
     let shown = if terminal { FINDINGS } else { findings.len() };
-    rows.extend(findings.iter().take(shown).flat_map(|text| wrap(text, LINES)));
+    rows.extend(findings.iter().take(shown).map(|text| clean(text)));
     rest(rows, findings.len(), shown, "finding")
 }
 

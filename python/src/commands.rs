@@ -48,7 +48,7 @@ pub fn diagnose(
         let found = gapscope::diagnose::found(&args, &|stage, part| watch.stage(stage, part))?;
         let files = found.files(Path::new(""))?;
         let files = files.into_iter().map(|(name, text)| (name.to_owned(), text)).collect();
-        Ok((files, found.summary(None, false), found.why(), found.sentences()))
+        Ok((files, found.text(), found.why(), found.sentences()))
     })
 }
 

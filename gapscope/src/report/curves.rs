@@ -28,7 +28,7 @@ pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
         return html! { p.muted { (why) } };
     }
     let most = (ALL_DOTS / drawn.len()).clamp(50, DOTS);
-    let chosen = choose(&drawn);
+    let chosen = choose(&drawn, &diagnosis.joints);
     let folded: Vec<&EffectCurve> =
         drawn.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).map(|(_, c)| *c).collect();
     html! {
@@ -57,7 +57,7 @@ fn curve(curve: &EffectCurve, most: usize) -> Markup {
     let beyond = curve.data.iter().filter(|p| p[1] < from || p[1] > to).count();
     let name = words::capital(&words::effect(&curve.kind));
     html! {
-        figure {
+        figure data-joints=(super::listed(std::slice::from_ref(&curve.joint))) {
             figcaption { b { (name) } span { (curve.joint) } }
             (Plot {
                 description: format!("{name} at {}: fitted law and data, torque in {unit} over {}", curve.joint, curve.x_label),
@@ -94,7 +94,7 @@ fn bulk(data: &[[f64; 2]]) -> Vec<f64> {
 }
 
 /// Indices of the curves shown at once, in order: effects take turns, each with its largest law first.
-fn choose(curves: &[&EffectCurve]) -> Vec<usize> {
+fn choose(curves: &[&EffectCurve], joints: &[String]) -> Vec<usize> {
     let span = |i: &usize| {
         let values = curves[*i].law.iter().map(|p| p[1]).filter(|v| v.is_finite());
         let (from, to) = values.fold((0.0, 0.0), |(a, b): (f64, f64), v| (a.min(v), b.max(v)));
@@ -123,6 +123,10 @@ fn choose(curves: &[&EffectCurve]) -> Vec<usize> {
             }
         }
     }
-    chosen.sort_unstable();
+    // Joints in the robot's order, as everywhere on the page.
+    chosen.sort_by_key(|&i| {
+        let kind = kinds.iter().position(|kind| *kind == curves[i].kind);
+        (kind, joints.iter().position(|joint| *joint == curves[i].joint), i)
+    });
     chosen
 }

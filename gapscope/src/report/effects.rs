@@ -35,7 +35,7 @@ pub fn render(diagnosis: &Diagnosis) -> Markup {
 fn row(effect: &FoundEffect, all: &[String]) -> Markup {
     let apart: Vec<String> = effect.indistinguishable_from.iter().map(|kind| words::effect(kind)).collect();
     html! {
-        tbody {
+        tbody data-joints=(super::listed(&effect.joints)) {
             tr.effect {
                 th scope="row" {
                     (words::capital(&words::effect(&effect.kind))) " " code { (effect.kind) }

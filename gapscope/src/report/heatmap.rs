@@ -23,8 +23,15 @@ struct Column<'a> {
     cells: Vec<Option<&'a Regime>>,
 }
 
-/// The heat map, or a sentence where there is nothing to show; `whole` says what the shares are parts of.
-pub fn render(joints: &[String], regimes: &[Regime], caption: &str, whole: &str) -> Markup {
+/// The heat map, or a sentence where there is nothing to show; `whole` says what the shares are parts of, `quiet` which
+/// joints are at the noise floor and stay pale.
+pub fn render(
+    joints: &[String],
+    regimes: &[Regime],
+    caption: &str,
+    whole: &str,
+    quiet: &dyn Fn(&str) -> bool,
+) -> Markup {
     let joints: Vec<&String> = joints.iter().filter(|joint| regimes.iter().any(|r| r.joint == **joint)).collect();
     let groups = groups(&joints, regimes);
     if groups.is_empty() || joints.is_empty() {
@@ -51,11 +58,11 @@ pub fn render(joints: &[String], regimes: &[Regime], caption: &str, whole: &str)
                 }
                 tbody {
                     @for (row, joint) in joints.iter().enumerate() {
-                        tr {
-                            th scope="row" { span { (joint) } }
+                        tr.quiet[quiet(joint)] data-joints=(super::listed(std::slice::from_ref(*joint))) {
+                            th scope="row" { span { (joint) @if quiet(joint) { small { "at the noise" } } } }
                             @for group in &groups {
                                 @for (i, column) in group.columns.iter().enumerate() {
-                                    (cell(column.cells.get(row).copied().flatten(), i == 0))
+                                    (cell(column.cells.get(row).copied().flatten(), i == 0, quiet(joint)))
                                 }
                             }
                         }
@@ -96,12 +103,19 @@ pub fn picture(title: &str, joints: &[String], regimes: &[Regime]) -> Option<Str
     Some(Matrix { title, sides: ["joint", "regime"], rows: &rows, columns: &names, cells: &cells, note }.svg())
 }
 
-fn cell(regime: Option<&Regime>, first: bool) -> Markup {
+fn cell(regime: Option<&Regime>, first: bool, quiet: bool) -> Markup {
     let Some(regime) = regime else {
         return html! { td.empty.first[first] { (NONE) } };
     };
-    let marked = words::stands_out(regime);
-    let shade = if regime.share.is_finite() { regime.share.clamp(0.0, 1.0) } else { 0.0 };
+    // Where a gap is noise, its shares are those of noise.
+    let marked = !quiet && words::stands_out(regime);
+    let shade = if quiet {
+        0.0
+    } else if regime.share.is_finite() {
+        regime.share.clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     html! {
         td.marked[marked] .first[first] style={ "--a:" (super::chart::short(shade)) } title=(tip(regime)) {
             (whole_percent(regime.share))
@@ -135,7 +149,8 @@ fn legend(whole: &str) -> Markup {
             " share of " (whole) ", %. "
             span.key aria-hidden="true" { "62" small { "7.8×" } }
             " framed: the regime holds at least 1.5 times its part of the samples, and its whole 95 % interval lies above; "
-            "the small figure is share ÷ samples. Regimes overlap, so a row does not add up to 100."
+            "the small figure is share ÷ samples. Regimes overlap, so a row does not add up to 100. Shares are of the square: "
+            "half the rms is a quarter of it. Joints at the noise floor stay pale."
         }
     }
 }

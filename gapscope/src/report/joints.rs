@@ -20,12 +20,12 @@ pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
             span.swatch.floor {} " noise floor of the log"
             span.swatch.whisker {} " 95 % interval"
         }
-        div class={ "rows" @if after.is_none() { " four" } } role="table" aria-label="Torque gap of each joint" {
+        div class={ "rows" @if after.is_none() { " four" } @else { " six" } } role="table" aria-label="Torque gap of each joint" {
             div.row.head role="row" {
                 span role="columnheader" { "joint" }
                 span role="columnheader" { "torque gap, rms" }
                 span role="columnheader" { "before" }
-                @if after.is_some() { span role="columnheader" { "after" } }
+                @if after.is_some() { span role="columnheader" { "after" } span role="columnheader" { "times less" } }
                 span role="columnheader" { "floor" }
             }
             @for joint in &diagnosis.joints {
@@ -59,14 +59,33 @@ fn row(joint: &str, diagnosis: &Diagnosis, after: Option<&TorqueGap>, evidence: 
     };
     let top = top(unit, diagnosis, after, evidence);
     html! {
-        div.row role="row" {
+        div.row role="row" data-joints=(super::listed(&[joint.to_owned()])) {
             span.name role="rowheader" { (joint) }
             span.bar role="cell" { (bars::render(&bars, floor, top, &description)) }
             span.number role="cell" data-label="before" { (print(&first)) }
-            @if after.is_some() { span.number role="cell" data-label="after" { (print(&second)) } }
+            @if after.is_some() {
+                span.number role="cell" data-label="after" { (print(&second)) }
+                span.number role="cell" data-label="times less" { (factor(first.as_ref(), second.as_ref())) }
+            }
             span.number role="cell" data-label="floor" { (floor_text) }
         }
     }
+}
+
+/// How many times smaller the gap has become; a bar beside one a hundred times as long cannot be seen.
+fn factor(before: Option<&Bar>, after: Option<&Bar>) -> String {
+    match (before, after) {
+        // A tenth more or less is none: the gap was noise already.
+        (Some(before), Some(after)) if (before.value / after.value - 1.0).abs() < 0.1 => "same".into(),
+        (Some(before), Some(after)) if after.value > 0.0 && before.value.is_finite() => {
+            format!("{}×", plain_two(before.value / after.value))
+        }
+        _ => NONE.into(),
+    }
+}
+
+fn plain_two(value: f64) -> String {
+    if value >= 9.95 { significant(value.round(), 2).trim_end_matches('.').to_owned() } else { significant(value, 2) }
 }
 
 /// Full length of the bars of all joints with this unit.

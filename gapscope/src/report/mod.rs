@@ -1,4 +1,6 @@
-//! The report: one self-contained HTML page with inline SVG, no network, no scripts, the same bytes for the same input.
+//! The report: one self-contained HTML page with inline SVG, no network, the same bytes for the same input.
+//!
+//! It says everything without its scripts; they turn the robot, zoom the torque and filter by joint.
 
 mod answer;
 pub mod axis;
@@ -8,14 +10,23 @@ mod curves;
 mod effects;
 mod format;
 mod heatmap;
+mod index;
 mod joints;
+mod packed;
+mod paste;
+pub mod plain;
 mod power;
+mod reproduce;
 mod rest;
 mod rollout;
+mod scene;
 pub mod score;
 mod series;
+mod setting;
 mod shrink;
+mod skeleton;
 pub mod terminal;
+mod why;
 mod words;
 
 #[cfg(test)]
@@ -25,6 +36,7 @@ mod tests;
 
 use gapscope_diagnosis::schema::{Diagnosis, Evidence, Verdict};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use serde::Serialize;
 
 pub use answer::sentences as answer_sentences;
 pub use answer::{changed, headline, is_above_floor, largest};
@@ -34,10 +46,12 @@ pub use format::{
     significant, span, with_unit,
 };
 pub use heatmap::picture as heatmap_picture;
+pub use index::{Entry, Found, page as index_page};
 pub use power::line as power_line;
 pub use rest::sentence as sentence_of_the_rest;
 pub use rollout::page as rollout_page;
 pub use series::picture as series_picture;
+pub use setting::Setting;
 pub use words::{
     capital, effect, implied_unit, interval, joints as joint_list, motion_unit, outstanding, parameter, regime,
     regime_phrase, rest as words_of_the_rest, said_of, verdict,
@@ -45,16 +59,38 @@ pub use words::{
 
 /// Colours, type and layout; light and dark, wide, narrow and print.
 const STYLE: &str = include_str!("style.css");
+/// Style and code of the chart that can be zoomed: uPlot, MIT licence.
+const CHART_STYLE: &str = include_str!("uplot/uPlot.min.css");
+const CHART: &str = include_str!("uplot/uPlot.iife.min.js");
+const CHART_LICENCE: &str = include_str!("uplot/LICENSE");
+/// The scripts of the report, which share one scope.
+const SCRIPTS: [&str; 3] =
+    [include_str!("script/page.js"), include_str!("script/skeleton.js"), include_str!("script/torque.js")];
+/// What the page may load: nothing.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+
+/// What the scripts read.
+#[derive(Serialize)]
+struct Packet<'a> {
+    torque: Vec<series::Packet<'a>>,
+    scene: Option<scene::Packet<'a>>,
+}
 
 /// The report of a diagnosis as one HTML page.
 ///
 /// Figures that are not numbers print as a dash; names from the user's files are escaped.
-pub fn html(diagnosis: &Diagnosis, evidence: &Evidence) -> String {
-    let sentences = answer::sentences(diagnosis, evidence);
+pub fn html(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> String {
     let title = format!("{}, {}", diagnosis.robot, words::verdict(diagnosis.verdict));
+    let packet = Packet { torque: series::packets(evidence), scene: setting.scene.as_ref().map(scene::Scene::packet) };
+    // A name that closes the script would end it: no text of JSON needs the sign as such.
+    let data = serde_json::to_string(&packet).unwrap_or_default().replace('<', "\\u003c");
     let content = html! {
-        (header(diagnosis, &sentences))
-        main { (body(diagnosis, evidence)) }
+        (header(diagnosis, evidence, setting))
+        main { (body(diagnosis, evidence, setting)) }
+        p #filter role="status" hidden { "Showing " b {} " only " button type="button" { "Show all joints" } }
+        script type="application/json" id="packet" { (PreEscaped(data)) }
+        script { (PreEscaped(format!("/*\n{CHART_LICENCE}*/\n{CHART}"))) }
+        script { (PreEscaped(format!("(() => {{\n{}\n}})();", SCRIPTS.join("\n")))) }
     };
     page(&title, &content, &diagnosis.schema)
 }
@@ -68,9 +104,10 @@ fn page(title: &str, content: &Markup, schema: &str) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
                 meta name="generator" content={ "gapscope " (env!("CARGO_PKG_VERSION")) };
                 title { "gapscope: " (title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(CHART_STYLE)) (PreEscaped(STYLE)) }
             }
             body {
                 (content)
@@ -81,22 +118,24 @@ fn page(title: &str, content: &Markup, schema: &str) -> String {
     page.into_string()
 }
 
-fn header(diagnosis: &Diagnosis, sentences: &[String; 3]) -> Markup {
+fn header(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Markup {
     let data = &diagnosis.data;
     html! {
         header {
-            p.kicker {
-                "Gap between simulator and robot · " b { (diagnosis.robot) } " · " (count(data.episodes, "episode")) ", "
-                (with_unit(&plain(data.duration), "s")) " at " (with_unit(&plain(data.rate), "Hz"))
-            }
-            @for fault in &data.faults { p.fault role="alert" { b { "Fault of the data. " } (crate::input::fault_line(fault)) } }
-            @for doubt in &data.doubts { p.fault { b { "In doubt. " } (doubt.question) } }
-            h1 class=(tone(diagnosis.verdict)) { (words::verdict(diagnosis.verdict)) }
-            p.meaning { (words::verdict_meaning(diagnosis.verdict)) }
-            dl.answer {
-                @for (question, sentence) in ["Where", "Which", "How far"].into_iter().zip(sentences) {
-                    div { dt { (question) } dd { (sentence.replace('–', "–\u{2060}")) } }
+            div.opening {
+                div {
+                    p.kicker {
+                        b { (diagnosis.robot) } " · " (count(diagnosis.joints.len(), "joint")) ", "
+                        (count(data.episodes, "episode")) ", "
+                        (with_unit(&plain(data.duration), "s")) " at " (with_unit(&plain(data.rate), "Hz"))
+                        @if !setting.made.is_empty() { " · " (setting.made) }
+                    }
+                    h1 class=(tone(diagnosis.verdict)) { (words::verdict(diagnosis.verdict)) }
+                    div.said { @for line in plain::answer(diagnosis) { p { (line) } } }
+                    @for fault in &data.faults { p.fault role="alert" { b { "Fault of the data. " } (ticked(&crate::input::fault_line(fault))) } }
+                    @for doubt in &data.doubts { p.fault { b { "In doubt. " } (ticked(&doubt.question)) } }
                 }
+                (skeleton::render(diagnosis, evidence, setting.scene.as_ref()))
             }
         }
     }
@@ -110,44 +149,80 @@ fn tone(verdict: Verdict) -> &'static str {
     }
 }
 
-fn body(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
-    let section = |id: &str, title: &str, lead: &str, content: Markup| {
-        html! {
-            section id=(id) aria-labelledby={ (id) "-title" } {
-                h2 id={ (id) "-title" } { (title) }
-                @if !lead.is_empty() { p.lead { (lead) } }
-                (content)
-            }
-        }
-    };
-    let evaluated = diagnosis.verdict != Verdict::NotExcited || !diagnosis.gap.torque.rms.is_empty();
+/// One part of the page under its heading.
+fn section(id: &str, title: &str, lead: &str, content: &Markup) -> Markup {
     html! {
-        (section("effects", "Effects", "What the robot does that the model does not, strongest first. Of the effects reported with a confidence of 90 %, nine in ten are there.",
-            effects::render(diagnosis)))
-        @if evaluated {
-            (figures(&section, diagnosis, evidence))
+        section id=(id) aria-labelledby={ (id) "-title" } {
+            h2 id={ (id) "-title" } { (title) }
+            @if !lead.is_empty() { p.lead { (lead) } }
+            (content)
         }
-        (section("alternatives", "What else it could be", "Other sets of effects that these logs do not exclude.", rest::alternatives(diagnosis)))
-        (section("next", "The next experiment", "", rest::next_experiment(diagnosis)))
+    }
+}
+
+fn body(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Markup {
+    let evaluated = diagnosis.verdict != Verdict::NotExcited || !diagnosis.gap.torque.rms.is_empty();
+    let robot = match evidence.robot_file.as_str() {
+        "" => "ROBOT.urdf".to_owned(),
+        file => reproduce::shown(file),
+    };
+    html! {
+        @if evaluated { (section("torque", "Torque over time", "", &series::render(diagnosis, evidence))) }
+        @if let Some(paste) = paste::render(diagnosis, setting, &robot) {
+            (section("change", "What to change", "", &paste))
+        }
+        (section("effects", "Effects", "What the robot does that the model does not, strongest first. Of the effects reported with a confidence of 90 %, nine in ten are there.",
+            &effects::render(diagnosis)))
+        @if evaluated { (figures(diagnosis, evidence)) }
+        (section("alternatives", "What else it could be", "Other sets of effects that these logs do not exclude.", &rest::alternatives(diagnosis)))
+        @if let Some(why) = why::render(diagnosis) {
+            (section("why", "Why it is so", "What was proposed, against what, and by how much the logs spoke for it.", &why))
+        }
+        (section("next", "The next experiment", "", &rest::next_experiment(diagnosis)))
         @if !diagnosis.power.is_empty() {
             (section("power", "What these logs could have revealed", "The least size of each effect that would have been found. Anything smaller could be there, and nobody could tell from these logs.",
-                power::render(diagnosis)))
+                &power::render(diagnosis)))
         }
-        (section("data", "Data", "", rest::data(diagnosis, evidence)))
-        (section("reproduce", "How to reproduce", "", rest::reproduce(diagnosis, evidence)))
+        (section("data", "Data and findings", "", &rest::data(diagnosis, evidence)))
+        (section("reproduce", "How to reproduce", "", &reproduce::render(diagnosis, evidence, setting)))
     }
 }
 
 /// The sections that rest on an evaluation: left out where the logs allowed none.
-fn figures(section: &dyn Fn(&str, &str, &str, Markup) -> Markup, diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
+fn figures(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
+    let quiet = |joint: &str| !is_above_floor(diagnosis, joint);
+    let sentences = answer::sentences(diagnosis, evidence);
     html! {
-        (section("regimes", "Where the gap lies", "Share of each regime in its joint’s squared torque gap, for the model as described, on held-out data.",
-            heatmap::render(&diagnosis.joints, &diagnosis.gap.regimes, "Gap by joint and regime", "the joint’s squared torque gap")))
+        (section("laws", "The law of each effect", "", &curves::render(diagnosis, evidence)))
         (section("joints", "Torque gap by joint", "Measured torque less what the model needs for the same motion, rms on held-out data.",
-            joints::render(diagnosis, evidence)))
-        (section("torque", "Torque over time", "", series::render(diagnosis, evidence)))
-        (section("shrink", "How far it shrinks", "", shrink::render(diagnosis)))
-        (section("laws", "The law of each effect", "", curves::render(diagnosis, evidence)))
-        (section("left", "What is left unexplained", "", rest::unexplained(diagnosis)))
+            &joints::render(diagnosis, evidence)))
+        (section("regimes", "Where the gap lies", "Share of each regime in its joint’s squared torque gap, for the model as described, on held-out data.",
+            &heatmap::render(&diagnosis.joints, &diagnosis.gap.regimes, "Gap by joint and regime", "the joint’s squared torque gap", &quiet)))
+        (section("shrink", "How far it shrinks", "", &html! {
+            dl.answer {
+                @for (question, sentence) in ["Where", "Which", "How far"].into_iter().zip(sentences) {
+                    div { dt { (question) } dd { (sentence.replace('–', "–\u{2060}")) } }
+                }
+            }
+            (shrink::render(diagnosis))
+        }))
+        (section("left", "What is left unexplained", "", &rest::unexplained(diagnosis)))
+    }
+}
+
+/// Names of joints for the page's filter, as JSON; none stands for the whole robot.
+fn listed(joints: &[String]) -> String {
+    serde_json::to_string(joints).unwrap_or_default()
+}
+
+/// Text whose parts between backticks are code.
+fn ticked(text: &str) -> Markup {
+    let parts: Vec<&str> = text.split('`').collect();
+    // An odd one stays what it is.
+    let paired = parts.len() % 2 == 1;
+    html! {
+        @if paired {
+            @for (i, part) in parts.iter().enumerate() { @if i % 2 == 1 { code { (part) } } @else { (part) } }
+        } @else { (text) }
     }
 }

@@ -15,7 +15,7 @@ pub fn unexplained(diagnosis: &Diagnosis) -> Markup {
         } @else {
             p { (sentence(diagnosis)) }
             @if left.fraction > 0.0 && !left.regimes.is_empty() {
-                (heatmap::render(&diagnosis.joints, &left.regimes, "What is left, by joint and regime", "what is left at the joint"))
+                (heatmap::render(&diagnosis.joints, &left.regimes, "What is left, by joint and regime", "the square of what is left at the joint", &|joint: &str| !super::is_above_floor(diagnosis, joint)))
             }
         }
     }
@@ -79,8 +79,8 @@ pub fn next_experiment(diagnosis: &Diagnosis) -> Markup {
     let kinds: Vec<String> = next.separates.iter().map(|kind| words::effect(kind)).collect();
     html! {
         div.callout {
-            p { b { (next.motion) } }
-            p { (next.why) }
+            p { b { (super::ticked(&next.motion)) } }
+            p { (super::ticked(&next.why)) }
             @if let Some(file) = &next.trajectory {
                 p { code { (file) } " beside this report holds time, position, velocity and acceleration of every joint, from rest to rest, within the URDF’s limits. Diagnose its log together with these." }
             }
@@ -105,7 +105,7 @@ pub fn data(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
         @if data.findings.is_empty() {
             p { "None: nothing odd in the robot description or the logs." }
         } @else {
-            ul.findings { @for finding in &data.findings { li { (finding) } } }
+            ul.findings { @for finding in &data.findings { li { (super::ticked(finding)) } } }
         }
         details {
             summary { "The gap by joint in SI units" }
@@ -158,30 +158,4 @@ fn pair(before: &Gap, after: Option<&Gap>, unit: &str, pick: impl Fn(&Gap) -> Op
         Some(second) => format!("{} → {}", figure(first), with_unit(&figure(second), unit)),
         None => with_unit(&figure(first), unit),
     }
-}
-
-/// Commands that check the figures on other logs.
-pub fn reproduce(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
-    let or = |text: &str, otherwise: &str| {
-        if text.is_empty() { otherwise.to_string() } else { quote(text) }
-    };
-    let robot = or(&evidence.robot_file, "ROBOT.urdf");
-    let corrected = or(&evidence.corrected_file, "corrected.json");
-    let logs: Vec<String> = evidence.logs.iter().map(|log| quote(log)).collect();
-    let logs = if logs.is_empty() { "LOG...".into() } else { logs.join(" ") };
-    let with = html! { @if !diagnosis.effects.is_empty() { " " span.nowrap { "--with " (corrected) } } };
-    html! {
-        p { "The same figures on logs that this diagnosis has not seen:" }
-        pre { code { "gapscope evaluate " (robot) " OTHER_LOG..." (with) } }
-        p { "Measured, nominal and corrected torque of every sample, to check the figures by other means:" }
-        pre { code { "gapscope evaluate " (robot) " " (logs) (with) " " span.nowrap { "--predictions predictions.csv" } } }
-        p { "This report and " code { "diagnosis.json" } " again:" }
-        pre { code { "gapscope diagnose " (robot) " " (logs) } }
-    }
-}
-
-/// A word as a shell takes it.
-fn quote(text: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@".contains(c);
-    if text.chars().all(plain) { text.into() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }

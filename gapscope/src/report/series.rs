@@ -1,16 +1,24 @@
 //! Measured against modelled torque over time, one small multiple for each joint.
 
+use super::answer;
 use super::axis::Axis;
-use super::chart::{Plot, envelope, line};
-use super::format::{figure, with_unit};
+use super::chart::{Plot, band, envelope, line};
+use super::format::{count, figure, with_unit};
+use super::packed::{self, Packed};
 use crate::picture::{Panel, Series, panels};
 use gapscope_diagnosis::schema::{Diagnosis, Evidence, TorqueSeries};
 use maud::{Markup, html};
+use serde::Serialize;
 
-/// Points of all lines together: keeps the page below a megabyte whatever the robot.
-const POINTS: usize = 90_000;
+/// Points of all still lines together: keeps the page small whatever the robot.
+const POINTS: usize = 24_000;
 /// Most stretches that one line is thinned to.
-const STRETCHES: usize = 750;
+const STRETCHES: usize = 240;
+/// The same of the lines that the script draws.
+const STRETCHES_ALL: usize = 2400;
+const STRETCHES_ONE: usize = 500;
+/// Joints whose pictures stand open; of more only the one that is shown in full.
+const OPEN: usize = 1;
 
 /// Longest stretch in a picture of its own, s, and what its lines are thinned to.
 const WINDOW: f64 = 12.0;
@@ -52,24 +60,91 @@ fn stretch(series: &TorqueSeries) -> [Panel; 2] {
     })
 }
 
-/// All joints, or a sentence where the evidence holds none.
+/// What the script draws of one joint.
+#[derive(Serialize)]
+pub struct Packet<'a> {
+    joint: &'a str,
+    unit: &'a str,
+    step: f64,
+    t: Packed,
+    m: Packed,
+    n: Packed,
+    c: Packed,
+    breaks: Vec<usize>,
+}
+
+/// Every joint's torque for the script, thinned so that the peaks of each line stay.
+pub fn packets(evidence: &Evidence) -> Vec<Packet<'_>> {
+    let drawn: Vec<&TorqueSeries> = evidence.torque.iter().filter(|s| !s.time.is_empty()).collect();
+    let stretches = (STRETCHES_ALL / drawn.len().max(1)).clamp(60, STRETCHES_ONE);
+    drawn.into_iter().map(|series| packet(series, stretches)).collect()
+}
+
+fn packet(series: &TorqueSeries, stretches: usize) -> Packet<'_> {
+    let lines = [&series.measured, &series.nominal, &series.corrected];
+    let mut kept: Vec<usize> = lines
+        .iter()
+        .filter(|l| l.len() == series.time.len())
+        .flat_map(|l| envelope(l, &series.breaks, stretches))
+        .collect();
+    kept.sort_unstable();
+    kept.dedup();
+    let step = packed::step(lines.into_iter().flatten().copied());
+    let of = |line: &[f64], step: f64| {
+        Packed::new(&kept.iter().filter_map(|&k| line.get(k).copied()).collect::<Vec<_>>(), step)
+    };
+    Packet {
+        joint: &series.joint,
+        unit: if series.unit.is_empty() { "N m" } else { &series.unit },
+        step,
+        t: of(&series.time, 1e-3),
+        m: of(&series.measured, step),
+        n: of(&series.nominal, step),
+        c: of(&series.corrected, step),
+        breaks: series.breaks.iter().filter_map(|b| kept.binary_search(b).ok()).collect(),
+    }
+}
+
+/// The joint with the largest gap in full, then all of them small; a sentence where the evidence holds none.
 pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
     let drawn: Vec<&TorqueSeries> = evidence.torque.iter().filter(|s| !s.time.is_empty()).collect();
-    if drawn.is_empty() {
+    let Some(first) = drawn.first() else {
         return html! { p.muted { "No torque over time was kept for this report." } };
-    }
+    };
     let stretches = (POINTS / (10 * drawn.len())).clamp(60, STRETCHES);
     let corrected = drawn.iter().any(|s| !s.corrected.is_empty());
+    let worst = answer::largest(diagnosis).map_or(first.joint.as_str(), |(joint, _)| joint);
+    let shown = drawn.iter().find(|s| s.joint == worst).unwrap_or(first);
     html! {
-        div.series {
-            p.legend {
-                label { input type="checkbox" class="show-measured" checked; span.swatch.measured {} " measured" }
-                label { input type="checkbox" class="show-before" checked; span.swatch.before {} " model as described" }
-                @if corrected { label { input type="checkbox" class="show-after" checked; span.swatch.after {} " model with the effects" } }
-                span.hint { "Below each: the error that is left, measured − model. Episodes one after another, held-out fits, thinned so that peaks stay." }
+        p.legend {
+            span.swatch.measured {} " measured"
+            span.swatch.before {} " model as described"
+            @if corrected { span.swatch.after {} " model with the effects" }
+            span.swatch.gap {} " gap between measured and model as described"
+        }
+        div #live hidden {
+            div.tools {
+                label { "joint " select { @for s in &drawn { option value=(s.joint) selected[s.joint == shown.joint] { (s.joint) } } } }
+                span role="group" aria-label="Zoom" {
+                    @for (act, label, sign) in [("in", "zoom in", "+"), ("out", "zoom out", "−"), ("left", "earlier", "←"), ("right", "later", "→"), ("all", "show all", "all")] {
+                        button type="button" data-zoom=(act) aria-label=(label) title=(label) { (sign) }
+                    }
+                }
             }
+            div.chart tabindex="0" role="application"
+                aria-label="Torque over time of the joint chosen. Arrow keys read it, plus and minus zoom, shift with arrows moves, 0 shows all." {}
+            output aria-live="polite" {}
+            p.note { "Below: measured less each model. Drag over a stretch to zoom, double-click to see all. Episodes one after another, fits on held-out data, thinned so that peaks stay." }
+        }
+        div data-still="" { (joint(shown, &rms(&shown.joint, diagnosis, evidence), stretches)) }
+        details.all-joints open[drawn.len() <= OPEN] {
+            summary { "All " (count(drawn.len(), "joint")) ", with the error that is left" }
             div.grid-two {
-                @for series in drawn { (joint(series, &rms(&series.joint, diagnosis, evidence), stretches)) }
+                @for series in drawn {
+                    div data-joints=(super::listed(std::slice::from_ref(&series.joint))) {
+                        (joint(series, &rms(&series.joint, diagnosis, evidence), stretches))
+                    }
+                }
             }
         }
     }
@@ -80,6 +155,17 @@ fn rms(joint: &str, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<f64> {
     let before = diagnosis.gap.torque.rms.get(joint);
     let after = evidence.remaining.as_ref().and_then(|gap| gap.torque.rms.get(joint));
     before.into_iter().chain(after).copied().collect()
+}
+
+/// The area between measured and model as described.
+fn shade(series: &TorqueSeries, stretches: usize, x: &Axis, y: &Axis) -> Markup {
+    let gap: Vec<f64> = series.measured.iter().zip(&series.nominal).map(|(a, b)| a - b).collect();
+    if gap.len() != series.time.len() {
+        return html! {};
+    }
+    let kept = envelope(&gap, &series.breaks, stretches);
+    let points: Vec<[f64; 3]> = kept.iter().map(|&i| [series.time[i], series.nominal[i], series.measured[i]]).collect();
+    band(&points, x, y, "gap")
 }
 
 fn joint(series: &TorqueSeries, rms: &[f64], stretches: usize) -> Markup {
@@ -120,6 +206,7 @@ fn joint(series: &TorqueSeries, rms: &[f64], stretches: usize) -> Markup {
             (Plot {
                 description: format!("{}: measured and modelled torque over time; {figures}", series.joint),
                 marks: html! {
+                    (shade(series, stretches, &x, &y))
                     (draw(&series.measured, &y, "measured"))
                     (draw(&series.nominal, &y, "before"))
                     (draw(&series.corrected, &y, "after"))

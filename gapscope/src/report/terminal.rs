@@ -1,15 +1,26 @@
 //! Text in the columns of a terminal: padding, cutting, wrapping, bars and colours.
 
+use console::{Term, measure_text_width};
 use gapscope_diagnosis::schema::Verdict;
 
-/// Columns of the terminal that a summary counts on.
+/// Columns of a summary where there is no terminal, and at most; and at least, where a terminal has next to none.
 pub const WIDTH: usize = 100;
+const NARROW: usize = 40;
 /// Columns before the text of a block.
 pub const INDENT: usize = 9;
 
-/// Rows under a heading that stands in the margin.
+/// Rows under a heading that stands in the margin; a row too long for the terminal goes on below, further in.
 pub fn block(lines: &mut Vec<String>, paint: &Paint, head: &str, rows: &[String]) {
-    for (i, row) in rows.iter().enumerate() {
+    let width = paint.width - INDENT;
+    let fit = |row: &String| match measure_text_width(row) {
+        columns if columns <= width => vec![row.clone()],
+        _ => {
+            let inner = row.len() - row.trim_start().len();
+            let broken = wrap(row.trim_start(), width.saturating_sub(inner + 2));
+            broken.iter().enumerate().map(|(i, l)| " ".repeat(inner + if i == 0 { 0 } else { 2 }) + l).collect()
+        }
+    };
+    for (i, row) in rows.iter().flat_map(fit).enumerate() {
         let margin = if i == 0 { paint.head(&pad(head, INDENT - 1)) } else { " ".repeat(INDENT - 1) };
         lines.push(format!("{margin} {row}"));
     }
@@ -42,14 +53,9 @@ pub fn fill(text: &str, width: usize) -> String {
     " ".repeat(width.saturating_sub(text.chars().count())) + text
 }
 
-/// Text within the terminal's width.
-pub fn cut(text: &str) -> String {
-    cut_to(text, WIDTH)
-}
-
 /// Text within `width` columns and free of control characters, so that a log's words cannot steer the terminal.
 pub fn cut_to(text: &str, width: usize) -> String {
-    let clean: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let clean = clean(text);
     if clean.chars().count() <= width {
         return clean;
     }
@@ -58,35 +64,50 @@ pub fn cut_to(text: &str, width: usize) -> String {
     short
 }
 
-/// Text broken at spaces into lines that fit beside the margin, at most `most` of them.
-pub fn wrap(text: &str, most: usize) -> Vec<String> {
-    let width = WIDTH - INDENT - 2;
+/// Text broken at spaces into lines of at most `width` columns, to its last word.
+pub fn wrap(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![];
     for word in text.split(' ').filter(|w| !w.is_empty()) {
         match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
+            Some(line) if measure_text_width(line) + 1 + measure_text_width(word) <= width => {
                 line.push(' ');
                 line.push_str(word);
             }
             _ => lines.push(word.to_string()),
         }
     }
-    if lines.len() > most {
-        lines.truncate(most);
-        if let Some(last) = lines.last_mut() {
-            last.push_str(" …");
-        }
-    }
-    lines.iter().map(|line| cut_to(line, width + 2)).collect()
+    lines
 }
 
-/// Colours of the terminal, where wanted.
+/// Text free of control characters, so that a log's words cannot steer the terminal.
+pub fn clean(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// What the summary is printed on: colours where wanted, and columns.
 pub struct Paint {
-    /// Whether the terminal shows colours.
+    /// Whether it is a terminal; elsewhere nothing is left out.
+    pub terminal: bool,
+    /// Whether it shows colours.
     pub color: bool,
+    /// Columns.
+    pub width: usize,
 }
 
 impl Paint {
+    /// Standard output as it is: colours on a terminal alone, and not where `NO_COLOR` asks for none.
+    pub fn here() -> Paint {
+        let term = Term::stdout();
+        let columns = term.size_checked().map_or(WIDTH, |(_, columns)| usize::from(columns));
+        let color = term.is_term() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+        Paint { terminal: term.is_term(), color, width: columns.clamp(NARROW, WIDTH) }
+    }
+
+    /// A file or a pipe.
+    pub fn plain() -> Paint {
+        Paint { terminal: false, color: false, width: WIDTH }
+    }
+
     fn with(&self, code: &str, text: &str) -> String {
         if self.color { format!("\u{1b}[{code}m{text}\u{1b}[0m") } else { text.to_string() }
     }

@@ -6,6 +6,7 @@ mod published;
 use crate::cli::{Input, RealLogs};
 use crate::diagnose::with_progress;
 use crate::input::load;
+use crate::report::terminal::Paint;
 use crate::report::{heatmap_picture, series_picture};
 use crate::{output, summary};
 use anyhow::{Context, Result, bail};
@@ -46,7 +47,8 @@ pub fn run(args: &RealLogs) -> Result<String> {
 
 /// Diagnoses one log, writes its page and its pictures; returns the summary.
 fn write(folder: &Path, log: &Log, out: &Path) -> Result<String> {
-    let outcome = with_progress(load(&input(folder, log.log))?)?;
+    let input_of = input(folder, log.log);
+    let (outcome, _) = with_progress(load(&input_of)?, &input_of)?;
     let others = log.others.iter().filter(|_| !outcome.diagnosis.effects.is_empty()).map(|&name| {
         let loaded = load(&input(folder, name))?;
         let (evaluation, _) = evaluate(&loaded.model, &loaded.episodes, Some(&outcome.corrected))?;
@@ -74,7 +76,7 @@ fn write(folder: &Path, log: &Log, out: &Path) -> Result<String> {
         }
     }
     output::write(&page, &markdown(log, &outcome, &others, names.each_ref().map(|name| name.as_deref())))?;
-    Ok(summary::summary(diagnosis, None, false))
+    Ok(summary::summary(diagnosis, None, &Paint::plain()))
 }
 
 /// Page and pictures of a log.

@@ -5,7 +5,7 @@ use crate::report::{percent, percent_interval};
 use gapscope_diagnosis::schema::Change;
 
 /// What a gap loses as a signed percentage: `−93 %`.
-pub fn change_sign(shrink: f64) -> String {
+fn change_sign(shrink: f64) -> String {
     let text = percent(shrink.abs());
     match text.trim_start_matches(['<', '>']) {
         _ if text.starts_with('<') || shrink == 0.0 => "±0 %".into(),

@@ -2,6 +2,11 @@
 
 use super::*;
 use crate::report::sample;
+use crate::report::terminal::WIDTH;
+
+fn summary(diagnosis: &Diagnosis, out: Option<&Path>, color: bool) -> String {
+    super::summary(diagnosis, out, &Paint { terminal: color, color, width: WIDTH })
+}
 
 #[test]
 fn fits_the_terminal() {
@@ -9,7 +14,7 @@ fn fits_the_terminal() {
         let text = summary(&diagnosis, Some(Path::new("/tmp/log.gapscope/report.html")), false);
         // Where no terminal shows them, all findings are there.
         assert!(
-            text.lines().count() <= 26 + 2 * diagnosis.data.findings.len(),
+            text.lines().count() <= 34 + 2 * diagnosis.data.findings.len(),
             "{name}: {} lines\n{text}",
             text.lines().count()
         );
@@ -52,6 +57,32 @@ fn names_what_it_found() {
         assert!(text.contains(part), "{part}\n{text}");
     }
     assert!(summary(&diagnosis, None, true).contains("\u{1b}[1;32mEXPLAINED"));
+}
+
+#[test]
+fn begins_with_the_answer_and_says_what_could_make_it_wrong_before_any_figure() {
+    for (name, diagnosis, _) in sample::all() {
+        let text = summary(&diagnosis, None, false);
+        let first = crate::report::plain::answer(&diagnosis).join(" ").replace(['\u{a0}', '\u{202f}'], " ");
+        let begun: String =
+            text.split("\n\n").next().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(begun, clean(&first).split_whitespace().collect::<Vec<_>>().join(" "), "{name}");
+        if let (Some(tie), Some(figures)) = (text.find("\nTies "), text.find("\nWhich ")) {
+            assert!(tie < figures, "{name}\n{text}");
+        }
+    }
+}
+
+#[test]
+fn a_narrow_terminal_gets_narrow_lines_and_every_word() {
+    let (_, mut diagnosis, _) = sample::explained();
+    diagnosis.data.findings =
+        vec!["the clock of the second log jumps by three seconds at sample 400, and once more later".into()];
+    let wide = super::summary(&diagnosis, None, &Paint { terminal: true, color: false, width: 100 });
+    let narrow = super::summary(&diagnosis, None, &Paint { terminal: true, color: false, width: 60 });
+    assert!(narrow.lines().all(|line| line.chars().count() <= 60), "{narrow}");
+    let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(words(&wide), words(&narrow));
 }
 
 #[test]

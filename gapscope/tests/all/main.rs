@@ -5,6 +5,7 @@ mod bad_input;
 mod book;
 mod commands;
 mod formats;
+mod report;
 mod rollout;
 mod support;
 mod train;

@@ -1,0 +1,100 @@
+//! How to check it all: who made this of what and when, and the commands that make it again.
+
+use super::setting::Setting;
+use gapscope_diagnosis::schema::{Diagnosis, Evidence};
+use maud::{Markup, html};
+use std::path::Path;
+
+/// Digits of a digest that tell files apart by eye; `corrected.json` has them all.
+const DIGITS: usize = 16;
+/// Logs that are listed at once; the rest folds away.
+const LISTED: usize = 8;
+
+/// Version, day, digests, commands.
+pub fn render(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Markup {
+    let or = |text: &str, otherwise: &str| {
+        if text.is_empty() { otherwise.to_string() } else { quote(&shown(text)) }
+    };
+    let robot = or(&evidence.robot_file, "ROBOT.urdf");
+    let corrected = or(&evidence.corrected_file, "corrected.json");
+    let logs: Vec<String> = evidence.logs.iter().map(|log| quote(&shown(log))).collect();
+    let logs = if logs.is_empty() { "LOG...".into() } else { logs.join(" ") };
+    let with = if diagnosis.effects.is_empty() { String::new() } else { format!(" --with {corrected}") };
+    let commands = [
+        (
+            "The same figures on logs that this diagnosis has not seen",
+            format!("gapscope evaluate {robot} OTHER_LOG...{with}"),
+        ),
+        (
+            "Measured, nominal and corrected torque of every sample, to check the figures by other means",
+            format!("gapscope evaluate {robot} {logs}{with} --predictions predictions.csv"),
+        ),
+        ("This report and diagnosis.json again", format!("gapscope diagnose {robot} {logs}")),
+    ];
+    html! {
+        dl.facts {
+            div { dt { "program" } dd { "gapscope " (env!("CARGO_PKG_VERSION")) } }
+            @if !setting.made.is_empty() { div { dt { "made on" } dd { (setting.made) } } }
+        }
+        (digests(evidence, setting))
+        @for (i, (what, command)) in commands.iter().enumerate() {
+            p { (what) ":" }
+            @let id = format!("command-{i}");
+            div.paste {
+                pre id=(id) tabindex="0" { (command) }
+                button.needs-script type="button" data-copy=(id) { "Copy" }
+            }
+        }
+        p.note { "Names are relative to the folder in which the command was called, or bare where it was given a whole path." }
+    }
+}
+
+fn digests(evidence: &Evidence, setting: &Setting) -> Markup {
+    let Some(origin) = &setting.origin else { return html! {} };
+    let robot = (shown(&evidence.robot_file), origin.robot.as_str());
+    let logs = evidence.logs.iter().zip(&origin.logs).map(|(log, digest)| (shown(log), digest.as_str()));
+    let rows: Vec<(String, &str)> = std::iter::once(robot).chain(logs).collect();
+    let list = |rows: &[(String, &str)]| {
+        html! {
+            ul.digests {
+                @for (name, digest) in rows {
+                    li { span { (name) } " " code title=(digest) { (digest.chars().take(DIGITS).collect::<String>()) } }
+                }
+            }
+        }
+    };
+    html! {
+        p { "Digests of what was read:" }
+        (list(&rows[..rows.len().min(LISTED)]))
+        @if rows.len() > LISTED {
+            details { summary { "and " (rows.len() - LISTED) " more" } (list(&rows[LISTED..])) }
+        }
+    }
+}
+
+/// A path as it may leave this machine: relative as it was given, else the name alone.
+pub fn shown(path: &str) -> String {
+    let as_path = Path::new(path);
+    let inside = as_path.is_relative() && !path.starts_with("..");
+    let name = as_path.file_name().map(|name| name.to_string_lossy().into_owned());
+    if inside { path.to_owned() } else { name.unwrap_or_else(|| path.to_owned()) }
+}
+
+/// A word as a shell takes it.
+fn quote(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@".contains(c);
+    if text.chars().all(plain) { text.into() } else { format!("'{}'", text.replace('\'', r"'\''")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_path_of_this_machine_leaves_it() {
+        assert_eq!(shown("logs/run 1.csv"), "logs/run 1.csv");
+        for path in ["/home/me/logs/run 1.csv", "../logs/run 1.csv"] {
+            assert_eq!(shown(path), "run 1.csv");
+        }
+    }
+}

@@ -1,0 +1,50 @@
+// The filter by joint, the copy button, and hints beside what scrolls.
+"use strict";
+const data = JSON.parse(document.getElementById("packet").textContent);
+const unpack = (row, step) => {
+  let sum = 0;
+  return row.map((difference) => difference == null ? null : (sum += difference) * step);
+};
+document.documentElement.classList.add("script");
+let picked = null;
+const pick = (joint) => {
+  picked = joint === picked ? null : joint;
+  document.querySelectorAll("[data-joints]").forEach((row) => {
+    const names = JSON.parse(row.dataset.joints);
+    row.classList.toggle("filtered", picked !== null && names.length > 0 && !names.includes(picked));
+  });
+  document.querySelectorAll("[data-pick]").forEach((chip) => {
+    chip.toggleAttribute("aria-current", chip.dataset.pick === picked);
+  });
+  document.querySelectorAll("#skeleton .joint").forEach((group) => {
+    group.classList.toggle("picked", group.dataset.joint === picked);
+    group.setAttribute("aria-pressed", String(group.dataset.joint === picked));
+  });
+  const note = document.getElementById("filter");
+  note.hidden = picked === null;
+  note.querySelector("b").textContent = picked ?? "";
+  if (picked !== null) show(picked);
+};
+document.querySelectorAll("[data-pick]").forEach((chip) => chip.addEventListener("click", (event) => {
+  event.preventDefault();
+  pick(chip.dataset.pick);
+}));
+document.querySelector("#filter button").addEventListener("click", () => pick(picked));
+document.querySelectorAll("[data-copy]").forEach((button) => button.addEventListener("click", async () => {
+  const source = document.getElementById(button.dataset.copy);
+  try {
+    await navigator.clipboard.writeText(source.textContent);
+    button.textContent = "Copied";
+  } catch {
+    // A page from a folder may not write to the clipboard: the text is selected instead.
+    getSelection().selectAllChildren(source);
+    button.textContent = "Selected: press Ctrl+C";
+  }
+}));
+const hint = () => document.querySelectorAll(".scroll").forEach((box) => {
+  box.classList.toggle("more", box.scrollWidth > box.clientWidth + 2 && box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
+});
+document.querySelectorAll(".scroll").forEach((box) => box.addEventListener("scroll", hint, { passive: true }));
+addEventListener("resize", hint);
+document.querySelectorAll("details").forEach((box) => box.addEventListener("toggle", hint));
+hint();

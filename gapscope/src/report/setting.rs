@@ -1,0 +1,53 @@
+//! What a report says beside diagnosis and evidence: the robot as a picture, what to change, where it all comes from.
+
+use super::scene::Scene;
+use crate::robot::Description;
+use gapscope_datasets::Episode;
+use gapscope_diagnosis::{Corrected, Origin};
+use gapscope_dynamics::{Loaded, Model};
+use gapscope_export::{Robot, Target, TargetLedger, export};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// Everything of a report that neither the public JSON nor the evidence holds; empty where it is not known.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Setting {
+    /// The robot's skeleton.
+    pub scene: Option<Scene>,
+    /// What a URDF holds of the corrections; `None` for another description.
+    pub ledger: Option<TargetLedger>,
+    /// Digests of model and logs.
+    pub origin: Option<Origin>,
+    /// The day on which it was made, `2026-01-31`, UTC.
+    pub made: String,
+}
+
+impl Setting {
+    /// The setting of a diagnosis that was just made. `loaded` is the robot as it was given, joints held as in `model`.
+    pub fn new(
+        model: &Model,
+        episodes: &[Episode],
+        corrected: &Corrected,
+        description: &Description,
+        loaded: Option<&Loaded>,
+    ) -> Setting {
+        let ledger = loaded.and_then(|loaded| {
+            let robot = Robot { text: description.text(), loaded, is_mjcf: description.is_mjcf() };
+            // A robot that has no URDF has nothing to paste into it.
+            Some(export(Target::Urdf, &robot, corrected, &[]).ok()?.ledger)
+        });
+        Setting {
+            scene: Some(Scene::new(model, episodes, corrected)),
+            ledger,
+            origin: corrected.made_from.clone(),
+            made: today(),
+        }
+    }
+}
+
+/// Today, UTC; or the day of `SOURCE_DATE_EPOCH`, which makes a report the same to the byte on any day.
+fn today() -> String {
+    let given = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
+    let now = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO).as_secs() as i64;
+    chrono::DateTime::from_timestamp(given.unwrap_or_else(now), 0)
+        .map_or_else(String::new, |time| time.format("%Y-%m-%d").to_string())
+}

@@ -1,0 +1,54 @@
+//! The pages as a person uses them: in a real browser where there is one; and the answer in short.
+
+use crate::support::{gapscope, pendulum, said};
+use std::path::Path;
+use std::process::Command;
+
+/// What the script says where there is no browser.
+const SKIPPED: i32 = 77;
+
+/// Runs the browser's script on pages; says so where it was skipped.
+fn look(pages: &[&Path], index: bool) {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/report/browser.py");
+    // A Python that has playwright may be another than the one of the path.
+    let python = std::env::var("GAPSCOPE_PYTHON").unwrap_or_else(|_| "python3".into());
+    let mut command = Command::new(python);
+    command.arg(script).args(pages).args(index.then_some("--index"));
+    let Ok(output) = command.output() else {
+        println!("skipped: no Python on this machine");
+        return;
+    };
+    match output.status.code() {
+        Some(SKIPPED) => println!("{}", said(&output)),
+        code => assert_eq!(code, Some(0), "{}", said(&output)),
+    }
+}
+
+#[test]
+fn report_and_index_work_in_a_browser() {
+    let dir = pendulum();
+    for out in ["runs/first", "runs/second"] {
+        let output = gapscope(dir.path(), ["diagnose", "robot.urdf", "log.csv", "--out", out]);
+        assert!(output.status.success(), "{}", said(&output));
+    }
+    let output = gapscope(dir.path(), ["report", "runs"]);
+    assert!(output.status.success() && said(&output).starts_with("2 of 2 diagnoses"), "{}", said(&output));
+    let page = std::fs::read_to_string(dir.path().join("runs/first/report.html")).unwrap();
+    let home = dir.path().to_string_lossy().into_owned();
+    assert!(!page.contains(&home), "no path of this machine is on the page");
+    look(&[&dir.path().join("runs/first/report.html")], false);
+    look(&[&dir.path().join("runs/index.html")], true);
+}
+
+#[test]
+fn the_answer_alone_is_three_sentences_and_json_is_json() {
+    let dir = pendulum();
+    let quiet = gapscope(dir.path(), ["diagnose", "robot.urdf", "log.csv", "--out", "out", "--quiet"]);
+    let text = String::from_utf8(quiet.stdout).unwrap();
+    assert!(quiet.status.success() && text.contains("viscous friction that the model lacks"), "{text}");
+    assert!(quiet.stderr.is_empty() && text.lines().count() <= 6 && !text.contains("Report"), "{text}");
+    let json = gapscope(dir.path(), ["diagnose", "robot.urdf", "log.csv", "--out", "again", "--json"]);
+    let printed: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    let file = std::fs::read_to_string(dir.path().join("again/diagnosis.json")).unwrap();
+    assert_eq!(printed, serde_json::from_str::<serde_json::Value>(&file).unwrap());
+}

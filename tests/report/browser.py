@@ -1,0 +1,248 @@
+"""Opens pages in headless Chromium, uses them as a person would, and says what is wrong.
+
+    pip install playwright==1.56.0                 # the driver alone; the browser is the system's own Chromium
+    python tests/report/browser.py report.html...  [--index] [--shots FOLDER]
+
+Each page is opened from its folder, without a network, at three sizes, light and dark. Checked: no error on the console,
+no request to anywhere, no sideways scrolling, text readable against what is behind it (WCAG AA). Of a report also: turning
+the robot, the filter by joint and the zoom, by pointer and by key, and that it says the same without JavaScript.
+With --index the page is one that `gapscope report` wrote. Exit status 0 if all is well, 1 if not, 77 if there is no browser.
+"""
+
+import argparse
+import pathlib
+import shutil
+import sys
+
+SKIPPED = 77
+SIZES = [(1440, 900), (768, 1024), (375, 812)]
+
+# Contrast of every text that shows, against the nearest background that is not transparent.
+CONTRAST = """() => {
+  const luminance = (c) => {
+    const [r, g, b] = c.map((v) => { v /= 255; return v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4; });
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const canvas = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+  const rgba = (text) => {
+    canvas.clearRect(0, 0, 1, 1);
+    canvas.fillStyle = text;
+    canvas.fillRect(0, 0, 1, 1);
+    const d = canvas.getImageData(0, 0, 1, 1).data;
+    return [d[0], d[1], d[2], d[3] / 255];
+  };
+  const over = (top, below) => [0, 1, 2].map((i) => top[i] * top[3] + below[i] * (1 - top[3]));
+  const behind = (element) => {
+    const layers = [];
+    for (let e = element; e; e = e.parentElement) layers.push(rgba(getComputedStyle(e).backgroundColor));
+    return layers.reverse().reduce((below, top) => over(top, below), [255, 255, 255]);
+  };
+  const bad = new Set();
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const element = walker.currentNode.parentElement;
+    if (!walker.currentNode.data.trim() || element.closest("script,style,svg,.sr,option") || !element.checkVisibility()) continue;
+    const style = getComputedStyle(element), ground = behind(element);
+    const ink = luminance(over(rgba(style.color), ground)), paper = luminance(ground);
+    const ratio = (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
+    const size = parseFloat(style.fontSize), large = size >= 24 || (size >= 18.66 && style.fontWeight >= 700);
+    if (ratio < (large ? 3 : 4.5)) bad.add(`${ratio.toFixed(2)}: ${walker.currentNode.data.trim().slice(0, 40)}`);
+  }
+  return [...bad];
+}"""
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("pages", nargs="+", type=pathlib.Path)
+    parser.add_argument("--index", action="store_true")
+    parser.add_argument("--shots", type=pathlib.Path)
+    args = parser.parse_args()
+    patience = 120_000  # ms; a machine may be busy
+    browser_file = next(filter(None, map(shutil.which, ["chromium", "chromium-browser", "google-chrome"])), None)
+    if browser_file is None:
+        print("skipped: no Chromium on this machine (apt install chromium)")
+        return SKIPPED
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        print("skipped: no playwright for this Python (pip install playwright)")
+        return SKIPPED
+    faults = []
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=browser_file, args=["--no-sandbox"], timeout=patience)
+        for file in args.pages:
+            for size in SIZES:
+                for scheme in ["light", "dark"]:
+                    name = f"{file.parent.name or 'page'} {size[0]} {scheme}"
+                    faults += [f"{name}: {fault}" for fault in check(browser, file, size, scheme, args)]
+            if not args.index:
+                faults += [f"{file}: {fault}" for fault in check_without_script(browser, file)]
+        browser.close()
+    for fault in faults:
+        print(fault)
+    print(f"{len(args.pages)} pages, {len(faults)} faults")
+    return 1 if faults else 0
+
+
+def check(browser, file, size, scheme, args):
+    context = browser.new_context(
+        viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, offline=True, has_touch=size[0] < 700
+    )
+    page = context.new_page()
+    faults = []
+    page.on("console", lambda m: faults.append(f"console: {m.text}") if m.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: faults.append(f"error: {error}"))
+    page.on("request", lambda r: faults.append(f"asks for {r.url}") if r.url != file.resolve().as_uri() else None)
+    page.goto(file.resolve().as_uri())
+    page.wait_for_timeout(150)
+    wide = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+    if (beyond := page.evaluate(wide)) > 0:
+        faults.append(f"scrolls sideways by {beyond} px")
+    if args.shots:
+        args.shots.mkdir(parents=True, exist_ok=True)
+        stem = f"{file.resolve().parent.name}-{size[0]}-{scheme}"
+        page.screenshot(path=args.shots / f"{stem}.png")
+        page.screenshot(path=args.shots / f"{stem}-whole.png", full_page=True)
+    page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
+    page.wait_for_timeout(50)
+    if (beyond := page.evaluate(wide)) > 0:
+        faults.append(f"scrolls sideways by {beyond} px with everything unfolded")
+    faults += [f"contrast {bad}" for bad in page.evaluate(CONTRAST)]
+    faults += use_index(page) if args.index else use_report(page)
+    context.close()
+    return faults
+
+
+def use_report(page):
+    faults = []
+    chart = page.locator("#live .chart")
+    if chart.count():
+        chart.scroll_into_view_if_needed()
+        span = "(() => { const b = document.querySelector('#live .chart'); return b.dataset.to - b.dataset.from; })()"
+        chart.focus()
+        page.keyboard.press("+")
+        near = page.evaluate(span)
+        page.keyboard.press("+")
+        if not page.evaluate(span) < near:
+            faults.append("the key + does not zoom")
+        page.keyboard.press("0")
+        page.keyboard.press("ArrowRight")
+        if "measured" not in page.locator("#live output").inner_text():
+            faults.append("an arrow key reads nothing")
+        page.locator("[data-zoom=in]").click()
+        page.locator("[data-zoom=in]").click()
+        if not page.evaluate(span) < near:
+            faults.append("the button + does not zoom")
+        page.locator("[data-zoom=all]").click()
+        box = page.locator("#live .u-over").first.bounding_box()
+        page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 50)
+        if "measured" not in page.locator("#live output").inner_text():
+            faults.append("the pointer reads nothing")
+        before = page.evaluate(ticks(page))
+        page.mouse.down()
+        page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60, steps=4)
+        page.mouse.up()
+        page.wait_for_timeout(60)
+        if page.evaluate(ticks(page)) == before:
+            faults.append("dragging does not zoom")
+        page.locator("[data-zoom=all]").click()
+    chips = page.locator("[data-pick]")
+    filtered = "[...document.querySelectorAll('[data-joints]')].filter((e) => e.classList.contains('filtered')).length"
+    if chips.count() > 1:
+        chips.nth(1).click()
+        if not page.evaluate(filtered) or not page.locator("#filter").is_visible():
+            faults.append("a joint of the list filters nothing")
+        page.locator("#filter button").click()
+        if page.evaluate(filtered):
+            faults.append("the filter does not go away")
+        chips.nth(0).focus()
+        page.keyboard.press("Enter")
+        if not page.evaluate(filtered):
+            faults.append("Enter on a joint of the list filters nothing")
+        page.keyboard.press("Enter")
+    if page.locator("#skeleton").count():
+        drawn = "document.querySelector('#skeleton .barrel').getAttribute('x2') + document.querySelector('#skeleton .floor').getAttribute('points')"
+        page.locator("#skeleton").scroll_into_view_if_needed()
+        before = page.evaluate(drawn)
+        page.locator("#skeleton").focus()
+        page.keyboard.press("ArrowLeft")
+        turned = page.evaluate(drawn)
+        if turned == before:
+            faults.append("an arrow key does not turn the robot")
+        box = page.locator("#skeleton").bounding_box()
+        page.mouse.move(box["x"] + 8, box["y"] + 20)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 90, box["y"] + 30, steps=4)
+        page.mouse.up()
+        if page.evaluate(drawn) == turned:
+            faults.append("dragging does not turn the robot")
+        if chips.count() > 1:
+            page.locator("#skeleton .joint").nth(0).focus()
+            page.keyboard.press("Enter")
+            if not page.evaluate(filtered):
+                faults.append("Enter on a joint of the robot filters nothing")
+            page.keyboard.press("Enter")
+            page.wait_for_timeout(30)
+            page.locator("#skeleton .joint .barrel").first.dispatch_event("click")
+            if not page.evaluate(filtered):
+                faults.append("a click on a joint of the robot filters nothing")
+            page.locator("#filter button").click()
+        for button in page.locator("[data-play]").all():
+            button.click()
+            page.wait_for_timeout(120)
+            button.click()
+    return faults
+
+
+def ticks(_page):
+    return "document.querySelector('#live canvas').toDataURL()"
+
+
+def use_index(page):
+    rows = "[...document.querySelectorAll('#diagnoses tbody tr')].filter((r) => !r.hidden).map((r) => r.dataset.name).join('|')"
+    faults = []
+    before = page.evaluate(rows)
+    heads = page.locator("#diagnoses thead button")
+    heads.nth(0).focus()
+    page.keyboard.press("Enter")
+    first = page.evaluate(rows)
+    heads.nth(0).click()
+    if page.evaluate(rows) == first and "|" in before:
+        faults.append("a heading does not sort")
+    page.locator("#find").fill("no robot has this name")
+    if page.evaluate(rows):
+        faults.append("the filter shows what it should not")
+    page.locator("#find").fill("")
+    boxes = page.locator("#diagnoses tbody input[type=checkbox]")
+    if boxes.count() > 1:
+        boxes.nth(0).check()
+        boxes.nth(1).focus()
+        page.keyboard.press("Space")
+        if page.locator("#beside article").count() != 2:
+            faults.append("two diagnoses are not shown side by side")
+        if page.evaluate("document.documentElement.scrollWidth > document.documentElement.clientWidth"):
+            faults.append("side by side scrolls sideways")
+    return faults
+
+
+def check_without_script(browser, file):
+    faults = []
+    texts = []
+    for enabled in [True, False]:
+        context = browser.new_context(java_script_enabled=enabled, offline=True)
+        page = context.new_page()
+        page.goto(file.resolve().as_uri())
+        texts.append(page.locator(".said").inner_text())
+        if not enabled and page.locator("#live").is_visible():
+            faults.append("without JavaScript an empty chart shows")
+        if not enabled and page.locator("#live").count() and not page.locator("[data-still] svg").first.is_visible():
+            faults.append("without JavaScript no torque shows")
+        context.close()
+    if texts[0] != texts[1] or not texts[0].strip():
+        faults.append("the answer is another without JavaScript")
+    return faults
+
+
+if __name__ == "__main__":
+    sys.exit(main())

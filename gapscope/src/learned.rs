@@ -2,7 +2,7 @@
 
 use crate::cli::Kind;
 use anyhow::{Context, Result, bail, ensure};
-use gapscope_diagnosis::Contender;
+use gapscope_diagnosis::{Contender, Corrected};
 use gapscope_dynamics::Model;
 use gapscope_effects::Plant;
 use gapscope_network::{Mlp, Net, from_json, from_safetensors};
@@ -20,6 +20,20 @@ struct Setting {
     joints: Vec<String>,
     /// Time of a step, s.
     dt: f64,
+    /// Corrections of the physics that the residual was trained on.
+    physics: Option<serde_json::Value>,
+}
+
+/// What a folder that `gapscope train` wrote holds.
+pub struct Trained {
+    /// The weights.
+    pub network: Mlp<f32>,
+    /// What a residual corrects.
+    pub on: On,
+    /// Time of a step, s.
+    pub dt: f64,
+    /// Corrections of the physics that a residual was trained on; `None` for the robot as described.
+    pub physics: Option<Corrected>,
 }
 
 /// The model of `kind` in a folder that `gapscope train` wrote, or with other weights of that folder (safetensors or JSON):
@@ -29,6 +43,26 @@ struct Setting {
 /// Files that are missing or hold something else, another kind, other joints than the robot's, or a network of another
 /// shape; the text names file, cause and mend.
 pub fn load(path: &Path, kind: Kind, robot: &Model) -> Result<Contender> {
+    let Trained { network, on, dt, physics } = read(path, kind, robot)?;
+    let fits = || format!("the weights in {} do not fit training.json beside them", path.display());
+    let network = Net::new(network);
+    Ok(match kind {
+        Kind::Residual => {
+            let plant = match &physics {
+                Some(corrected) => corrected.plant(robot, dt)?,
+                None => Plant::nominal(robot, dt),
+            };
+            Contender::with_own_step("hybrid", Hybrid::new(plant, network, on).with_context(fits)?)
+        }
+        Kind::Pure => Contender::with_own_step("pure", Pure::new(robot.dof(), dt, network).with_context(fits)?),
+    })
+}
+
+/// What a folder that `gapscope train` wrote holds for a robot.
+///
+/// # Errors
+/// As those of [`load`].
+pub fn read(path: &Path, kind: Kind, robot: &Model) -> Result<Trained> {
     let weights = if path.is_dir() { path.join("weights.safetensors") } else { path.to_owned() };
     let network = network(&weights)?;
     let record = weights.with_file_name("training.json");
@@ -51,22 +85,17 @@ pub fn load(path: &Path, kind: Kind, robot: &Model) -> Result<Contender> {
     );
     let dt = setting.dt;
     ensure!(dt.is_finite() && dt > 0.0, "{}: its step dt is {dt}, expected seconds above zero", record.display());
-    let fits = || format!("{} does not fit {}", weights.display(), record.display());
-    Ok(match kind {
-        Kind::Residual => {
-            let hybrid = Hybrid::new(Plant::nominal(robot, dt), network, setting.on.unwrap_or_default());
-            Contender::with_own_step("hybrid", hybrid.with_context(fits)?)
-        }
-        Kind::Pure => Contender::with_own_step("pure", Pure::new(joints.len(), dt, network).with_context(fits)?),
-    })
+    let physics = setting.physics.map(|value| Corrected::from_json(&value.to_string(), robot)).transpose();
+    let on = setting.on.unwrap_or_default();
+    Ok(Trained { network, on, dt, physics: physics.with_context(wrong)? })
 }
 
-fn network(weights: &Path) -> Result<Net<f32>> {
+fn network(weights: &Path) -> Result<Mlp<f32>> {
     let bytes = std::fs::read(weights).with_context(|| format!("cannot read the weights {}", weights.display()))?;
     let network: Result<Mlp<f32>> = match weights.extension().and_then(|e| e.to_str()) {
         Some("safetensors") => from_safetensors(&bytes).map_err(Into::into),
         Some("json") => String::from_utf8(bytes).map_err(Into::into).and_then(|text| Ok(from_json(&text)?)),
         _ => bail!("{}: weights are read from .safetensors and .json files", weights.display()),
     };
-    Ok(Net::new(network.with_context(|| format!("{} holds no weights", weights.display()))?))
+    network.with_context(|| format!("{} holds no weights", weights.display()))
 }

@@ -2,6 +2,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod cli;
+mod compare;
 mod demo;
 mod diagnose;
 mod evaluate;
@@ -13,6 +14,7 @@ mod learned;
 mod output;
 mod picture;
 mod report;
+mod residuals;
 mod robot;
 mod rollout;
 mod servo;
@@ -31,7 +33,9 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Residuals(args) => residuals::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Study(study) => study::run(&study),
         Command::Demo(args) => demo::run(&args),

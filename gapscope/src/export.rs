@@ -421,7 +421,7 @@ mod tests {
         let model = gapscope_dynamics::Model::from_urdf(&std::fs::read_to_string(&robot).unwrap()).unwrap().model;
         let joints: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
         let logs = gapscope_datasets::read_logs(&[log], &joints, &gapscope_datasets::ReadOptions::default()).unwrap().0;
-        let found = gapscope_diagnosis::diagnose(&model, &logs, Vec::new(), &|_, _| {}).unwrap();
+        let found = gapscope_diagnosis::diagnose(&model, &logs, Vec::new(), &|_: &str, _: f64| {}).unwrap();
         std::fs::write(folder.join("diagnosis.json"), serde_json::to_string(&found.diagnosis).unwrap()).unwrap();
         let told = run(&words).unwrap();
         let text = std::fs::read_to_string(folder.join("export/ranges.json")).unwrap();

@@ -281,7 +281,7 @@ mod tests {
             read_logs(&[folder.join("out").join(name)], &joints, options).unwrap().0.remove(0)
         };
         let csv = read("episode_0.csv", &ReadOptions::default());
-        assert!(csv.len() > 100 && told.contains(&format!("{} instants", csv.len())), "{told}");
+        assert!(csv.len() > 50 && told.contains(&format!("{} instants", csv.len())), "{told}");
         let near = |a: &[Vec<f64>], b: &[Vec<f64>]| {
             assert_eq!(a.len(), b.len());
             a.iter().flatten().zip(b.iter().flatten()).for_each(|(a, b)| assert!((a - b).abs() < 1e-12, "{a} {b}"));
@@ -290,7 +290,10 @@ mod tests {
         let mcap = read("episode_0.mcap", &topic("/effort"));
         near(&mcap.effort, &csv.effort);
         near(&mcap.position, &csv.position);
-        near(std::slice::from_ref(&mcap.time), std::slice::from_ref(&csv.time));
+        // Stamps are whole nanoseconds, from any origin.
+        let since = |time: &[f64]| time.iter().map(|t| t - time[0]).collect::<Vec<f64>>();
+        let late = since(&mcap.time).iter().zip(since(&csv.time)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(late < 2e-9, "{late}");
         if cfg!(feature = "parquet") {
             let parquet = read("episode_0.parquet", &ReadOptions::default());
             assert_eq!((&parquet.effort, &parquet.position, &parquet.time), (&csv.effort, &csv.position, &csv.time));

@@ -4,7 +4,6 @@ use crate::estimate::Fit;
 use crate::problem::Problem;
 use crate::refine::Data;
 use crate::regimes::quantile;
-use crate::schema::{Parameter, Quantity};
 use gapscope_dynamics::Model;
 use gapscope_effects::{EffectError, Kind};
 
@@ -45,16 +44,11 @@ impl Fit {
         if kind != Kind::StribeckFriction {
             return true;
         }
-        let told = self.parameters(problem, model, kind, &[candidate], speeds);
-        let of = |name: &str| match told.get(name) {
-            Some(Parameter::PerJoint(joints)) => joints.values().next(),
-            _ => None,
-        };
+        let told = self.told(problem, model, kind, &[candidate], speeds);
+        let of = |name: &str| told.iter().find(|told| told.value.name == name);
         let (Some(sliding), Some(at_rest)) = (of("coulomb"), of("static")) else { return false };
-        match (&sliding.value, &at_rest.ci95[0]) {
-            (Quantity::Scalar(sliding), Quantity::Scalar(least)) => least > sliding,
-            _ => false,
-        }
+        let least: f64 = at_rest.value.value[0] - at_rest.components[0].half_width();
+        least > sliding.value.value[0]
     }
 }
 

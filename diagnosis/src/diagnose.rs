@@ -4,6 +4,7 @@ use crate::band::Band;
 use crate::climb::{self, LATE, Rival};
 use crate::contact::{self, Left};
 use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
+use crate::covariance::covariance;
 use crate::estimate::{Fit, speeds};
 use crate::evidence;
 use crate::experiment;
@@ -450,7 +451,7 @@ impl Logs<'_> {
         let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());
         // What a law outside the catalogue accounts for does not speak against the effects beside it.
         let misfit = (verdict != Verdict::Explained).then_some(&beside);
-        let found = self.found_effects(chosen, rivals, misfit, change)?;
+        let (found, covariance) = self.found_effects(chosen, rivals, misfit, change)?;
         let corrected = Corrected {
             schema: MODEL_SCHEMA.to_owned(),
             robot: model.name().to_owned(),
@@ -489,6 +490,7 @@ impl Logs<'_> {
             next_experiment,
             power: power::power(model, &chosen.all, &chosen.choice.set, &drives),
             effects: found,
+            covariance,
             alternatives: alternatives(&chosen.all, rivals),
             why: self.why(chosen, rivals),
             unexplained: Unexplained {
@@ -518,13 +520,14 @@ impl Logs<'_> {
         rivals: &[Rival],
         misfit: Option<&Judged>,
         change: impl Fn(&Rows) -> Change,
-    ) -> Result<Vec<FoundEffect>, EffectError> {
+    ) -> Result<(Vec<FoundEffect>, Option<Covariance>), EffectError> {
         let (problem, fit) = (&chosen.exact, &chosen.fit);
         let kinds = climb::kinds(problem, &fit.set);
         let speeds = speeds(&self.signals, &self.band, self.model.dof());
-        let mut found = Vec::new();
+        let (mut found, mut told) = (Vec::new(), Vec::new());
         for (effect, own) in fit.effects_with_candidates(problem, self.model) {
             let kind = effect.kind();
+            let of_it = fit.told(problem, self.model, kind, &own, &speeds);
             let alone = change(&self.held_out_rows(problem, &own)?);
             let turned = chosen.turned.as_ref().filter(|t| t.drive.kind == kind);
             // The choice sees a drive by its rotor.
@@ -564,15 +567,17 @@ impl Logs<'_> {
                     joints: effect.law().joints(),
                     part: if kind.is_calibration() { Part::Calibration } else { Part::Further },
                     confidence: calibrated((1.0 - doubt) * (1.0 - misfit).powi(MISFIT)),
-                    parameters: fit.parameters(problem, self.model, kind, &own, &speeds),
+                    parameters: Fit::parameters(&of_it, self.model),
                     indistinguishable_from: confused,
                     shrink: EffectShrink { torque: alone.shrink, ci95: alone.ci95 },
                 },
             ));
+            told.push((effect, of_it));
         }
         // Strongest first: by what the best explanation without it leaves.
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Ok(found.into_iter().map(|(_, effect)| effect).collect())
+        let covariance = covariance(self.model, &fit.over_time(problem), &told);
+        Ok((found.into_iter().map(|(_, effect)| effect).collect(), covariance))
     }
 
     /// The comparisons that decided: each kind found against the best account without it, each spring or play that was tried
@@ -641,6 +646,7 @@ impl Logs<'_> {
                 regimes: Vec::new(),
             },
             effects: Vec::new(),
+            covariance: None,
             alternatives: Vec::new(),
             why: Vec::new(),
             unexplained: Unexplained { fraction: 0.0, learnable: 0.0, resembles: None, regimes: Vec::new() },

@@ -43,6 +43,33 @@ fn quantile(groups: usize) -> f64 {
     StudentsT::new(0.0, 1.0, groups.saturating_sub(1).max(1) as f64).map_or(1.96, |t| t.inverse_cdf(0.975))
 }
 
+/// A parameter with what the logs tell of each of its components.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// Its value under its public name.
+    pub value: Value,
+    /// One a number of the value.
+    pub components: Vec<Component>,
+}
+
+/// What the logs tell of one number.
+#[derive(Debug, Clone)]
+pub struct Component {
+    /// What it changes by with the coefficients of the fit: place among the fit's columns, derivative.
+    pub gradient: Vec<(usize, f64)>,
+    /// Half of the 95 % interval for what the coefficients are off by, which other parameters share.
+    pub shared: f64,
+    /// The same for what is its own.
+    pub own: f64,
+}
+
+impl Component {
+    /// Half of its 95 % interval.
+    pub fn half_width(&self) -> f64 {
+        self.shared.hypot(self.own)
+    }
+}
+
 /// A model in coefficients: a set of candidates fitted to some rows.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -132,20 +159,30 @@ impl Fit {
         problem.covariance(&self.columns, &self.theta).diagonal().iter().map(|v| quantile * v.sqrt()).collect()
     }
 
-    /// Parameters of an effect of a kind made of some candidates under their public names, with 95 % intervals by the delta
-    /// method: the wider of what blocks of time and of what parts of the speed of each of its joints tell, `speeds` telling the
-    /// part of each row of the band for each joint.
-    pub fn parameters(
+    /// Parameters of an effect of a kind made of some candidates under their public names, with 95 % intervals.
+    pub fn parameters(told: &[Told], model: &Model) -> BTreeMap<String, Parameter> {
+        let mut parameters: BTreeMap<String, Parameter> = BTreeMap::new();
+        for one in told {
+            let half: Vec<f64> = one.components.iter().map(Component::half_width).collect();
+            insert(&mut parameters, model, &one.value, &half);
+        }
+        parameters
+    }
+
+    /// What the logs tell of the parameters of an effect of a kind made of some candidates, by the delta method: the wider
+    /// of what blocks of time and of what parts of the speed of each of its joints tell, `speeds` telling the part of each row of
+    /// the band for each joint.
+    pub fn told(
         &self,
         problem: &Problem,
         model: &Model,
         kind: Kind,
         candidates: &[usize],
         speeds: &[Vec<usize>],
-    ) -> BTreeMap<String, Parameter> {
-        let over_time = problem.covariance(&self.columns, &self.theta) * quantile(problem.blocks_used()).powi(2);
+    ) -> Vec<Told> {
+        let over_time = self.over_time(problem);
         let mut over_speed: BTreeMap<usize, DMatrix<f64>> = BTreeMap::new();
-        let mut parameters: BTreeMap<String, Parameter> = BTreeMap::new();
+        let mut told = Vec::new();
         for &c in candidates {
             let (at, theta) = self.own(problem, c);
             let candidate = &problem.entries[c].candidate;
@@ -181,7 +218,8 @@ impl Fit {
             for (v, estimate) in estimates.iter().enumerate() {
                 let systematic = if Kind::FRICTION.contains(&kind) { OF_FRICTION } else { SYSTEMATIC };
                 let size = estimate.value.iter().map(|x| x * x).sum::<f64>().sqrt();
-                let half: Vec<f64> = (0..estimate.value.len())
+                let at_rest = problem.entries[c].held(self.without);
+                let components = (0..estimate.value.len())
                     .map(|component| {
                         let gradient: Vec<f64> = slopes
                             .iter()
@@ -191,27 +229,32 @@ impl Fit {
                                 })
                             })
                             .collect();
-                        let gradient = DVector::from_vec(gradient);
-                        let square = accounts.iter().map(|own| gradient.dot(&(own * &gradient))).fold(0.0, f64::max);
+                        if let ("static", Some(held)) = (estimate.name, at_rest.as_ref())
+                            && estimate.value == [held.torque]
+                        {
+                            let own = held.doubt.hypot(systematic * size);
+                            return Component { gradient: Vec::new(), shared: 0.0, own };
+                        }
+                        let along = DVector::from_vec(gradient.clone());
+                        let square = accounts.iter().map(|own| along.dot(&(own * &along))).fold(0.0, f64::max);
                         let knob = knob_moved
                             .as_ref()
                             .map_or(0.0, |moved| moved[v].value[component] - estimate.value[component]);
                         let timing = if LATE.contains(&kind) { TIMING * problem.sample } else { 0.0 };
                         let knob = knob * quantile(problem.blocks_used());
-                        square.sqrt().hypot(knob).hypot(systematic * size).hypot(timing)
+                        let own = knob.hypot(systematic * size).hypot(timing);
+                        Component { gradient: at.iter().copied().zip(gradient).collect(), shared: square.sqrt(), own }
                     })
                     .collect();
-                let at_rest = problem.entries[c].held(self.without);
-                let half = match (estimate.name, at_rest) {
-                    ("static", Some(held)) if estimate.value == [held.torque] => {
-                        vec![held.doubt.hypot(systematic * size)]
-                    }
-                    _ => half,
-                };
-                insert(&mut parameters, model, estimate, &half);
+                told.push(Told { value: estimate.clone(), components });
             }
         }
-        parameters
+        told
+    }
+
+    /// Squares of half-widths of 95 % intervals of the coefficients, and how they go together, by what blocks of time tell.
+    pub fn over_time(&self, problem: &Problem) -> DMatrix<f64> {
+        problem.covariance(&self.columns, &self.theta) * quantile(problem.blocks_used()).powi(2)
     }
 }
 
@@ -263,7 +306,8 @@ mod tests {
         let rows = |of: usize| part.iter().filter(|p| **p == of).count();
         assert!((0..PARTS).all(|of| rows(of).abs_diff(part.len() / PARTS) <= 1));
         let model = gapscope_dynamics::robots::model("double_pendulum").unwrap().unwrap().model;
-        let told = fit.parameters(&problem, &model, Kind::ViscousFriction, &[0], &speeds(&signals, &band, 2));
+        let told = fit.told(&problem, &model, Kind::ViscousFriction, &[0], &speeds(&signals, &band, 2));
+        let told = Fit::parameters(&told, &model);
         let Parameter::PerJoint(joints) = &told["viscous"] else { panic!("one a joint") };
         let Some(Estimate { ci95: [Quantity::Scalar(low), Quantity::Scalar(high)], .. }) = joints.values().next()
         else {

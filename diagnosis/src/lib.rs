@@ -13,6 +13,7 @@ mod ceiling;
 mod climb;
 mod contact;
 mod corrected;
+mod covariance;
 mod diagnose;
 mod doubt;
 mod drive;

@@ -45,6 +45,39 @@ pub struct Diagnosis {
     /// The least size of each effect that these logs would have revealed; an extension of the schema.
     #[serde(default)]
     pub power: Vec<Power>,
+    /// Standard errors of all parameters and how they go together; an extension of the schema.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<Covariance>,
+}
+
+/// Standard errors of all parameters that were found, and how they go together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Covariance {
+    /// The parameters, number by number.
+    pub parameters: Vec<ParameterError>,
+    /// The lower triangle of their correlations, row by row, the diagonal of ones included.
+    pub correlation: Vec<Vec<f64>>,
+}
+
+/// One number among the parameters, with its standard error.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterError {
+    /// Public name of the effect.
+    pub kind: String,
+    /// Public name of the parameter.
+    pub parameter: String,
+    /// The joint that it belongs to: that of the parameter, or the one that moves the link concerned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    /// Which number of a vector.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub component: Option<usize>,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
+    /// Unit of both.
+    pub unit: String,
 }
 
 /// One comparison of two accounts of the logs.

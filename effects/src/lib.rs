@@ -53,7 +53,7 @@ pub use load_dependent_friction::LoadDependentFriction;
 pub use motion::{Held, Motion, soft_sign};
 pub use parallel_spring::ParallelSpring;
 pub use payload::Payload;
-pub use plant::{Plant, Transmission};
+pub use plant::{Actuation, Bristle, Direction, Elements, Plant, Ripple, Transmission};
 pub use presliding_friction::PreslidingFriction;
 pub use signature::{Candidate, Column, EncoderSide, Range};
 pub use stribeck_friction::StribeckFriction;

@@ -5,17 +5,21 @@
 //! with them predicts what the target's torque gap will be, before the target runs.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod c;
 mod carry;
 mod isaaclab;
 mod ledger;
 mod mjcf;
 mod number;
+mod ranges;
 mod totals;
 mod urdf;
 
+pub use c::weights;
 pub use carry::{Carried, How, Usual};
 pub use ledger::{Entry, LEDGER_SCHEMA, Ledger, TargetLedger};
 pub use mjcf::motor_joint;
+pub use ranges::{RANGES_SCHEMA, RangeOf, Ranges, SAMPLER};
 
 use carry::Context;
 use gapscope_datasets::Episode;
@@ -33,6 +37,8 @@ pub enum Target {
     Mjcf,
     /// A configuration for Isaac Lab, which reads the URDF beside it.
     IsaacLab,
+    /// A C file that steps the robot.
+    C,
 }
 
 impl Target {
@@ -42,6 +48,7 @@ impl Target {
             Target::Urdf => "urdf",
             Target::Mjcf => "mjcf",
             Target::IsaacLab => "isaaclab",
+            Target::C => "c",
         }
     }
 
@@ -51,6 +58,7 @@ impl Target {
             Target::Urdf => "robot.urdf",
             Target::Mjcf => "robot.xml",
             Target::IsaacLab => "isaaclab_robot.py",
+            Target::C => "robot.c",
         }
     }
 }
@@ -64,7 +72,12 @@ pub struct Robot<'a> {
     pub loaded: &'a Loaded,
     /// Whether the text is MJCF.
     pub is_mjcf: bool,
+    /// Length of a step in targets that have one of their own, s.
+    pub dt: f64,
 }
+
+/// Length of a step where nothing says otherwise, s.
+pub const DT: f64 = 1e-3;
 
 /// A file for a target, and what it holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,7 +112,7 @@ pub enum ExportError {
 /// # Errors
 /// A robot that the target cannot start from, or an effect that the robot cannot have.
 pub fn export(target: Target, robot: &Robot, corrected: &Corrected, logs: &[Episode]) -> Result<Exported, ExportError> {
-    if target != Target::Mjcf && robot.is_mjcf {
+    if matches!(target, Target::Urdf | Target::IsaacLab) && robot.is_mjcf {
         return Err(ExportError::NoUrdf);
     }
     let model = &robot.loaded.model;
@@ -113,20 +126,36 @@ pub fn export(target: Target, robot: &Robot, corrected: &Corrected, logs: &[Epis
             Target::Urdf => urdf::carry(effect, &context, |joint| urdf::has_limit(robot, joint)),
             Target::Mjcf => mjcf::carry(effect, &context),
             Target::IsaacLab => isaaclab::carry(effect, &context, |joint| urdf::has_limit(robot, joint)),
+            Target::C => vec![c::carry(effect)],
         })
         .collect();
     let held = held(&carried);
     let totals = Totals::new(model, &held)?;
+    let mut emptied = Vec::new();
     let text = match target {
-        Target::Urdf => urdf::write(robot, &totals)?,
+        Target::Urdf => {
+            let (text, without) = urdf::write(robot, &totals)?;
+            emptied = without;
+            text
+        }
         Target::Mjcf => mjcf::write(model, &totals, &held),
         Target::IsaacLab => isaaclab::write(model, &totals, &corrected.effects),
+        Target::C => {
+            let plant = Corrected { effects: held, ..corrected.clone() }.plant(model, robot.dt)?;
+            let of = |joint: &gapscope_dynamics::Joint| corrected.standstill.get(&joint.name).copied().unwrap_or(0.0);
+            c::write(&plant, &model.joints().iter().map(of).collect::<Vec<_>>())
+        }
     };
     let mut ledger = predict(robot, corrected, logs, &carried)?;
     ledger.target = target.name().to_owned();
     ledger.file = target.file().to_owned();
     ledger.paste = if target == Target::Urdf { urdf::paste(model, &totals) } else { Vec::new() };
-    ledger.notes = notes(target, corrected, &totals);
+    ledger.notes = notes(target, robot.dt, corrected, &totals);
+    ledger.notes.extend(emptied.iter().map(|link| {
+        format!(
+            "link `{link}` has no mass of its own any more: the link that it is fixed to has that of both, corrected"
+        )
+    }));
     Ok(Exported { target, text, ledger })
 }
 
@@ -191,7 +220,7 @@ fn predict(
 }
 
 /// What a target does otherwise, whatever the effects.
-fn notes(target: Target, corrected: &Corrected, totals: &Totals) -> Vec<String> {
+fn notes(target: Target, dt: f64, corrected: &Corrected, totals: &Totals) -> Vec<String> {
     let mut notes = Vec::new();
     for joint in totals.model.joints().iter().filter(|joint| !joint.inertia.is_physical()) {
         notes.push(format!(
@@ -209,6 +238,10 @@ fn notes(target: Target, corrected: &Corrected, totals: &Totals) -> Vec<String> 
             let shown = if corrected.encoder_side == EncoderSide::Motor { motor_joint(joint) } else { joint.clone() };
             notes.push(format!("the encoder of `{joint}` shows the position of joint `{shown}` of the file"));
         }
+    }
+    if target == Target::C {
+        notes.push(format!("a step is {dt} s, as --dt says; hold commands over it"));
+        notes.push("limits of position, speed and effort in the robot description are not carried over".to_owned());
     }
     if target == Target::IsaacLab {
         notes.push("not run here: Isaac Sim is not where the project is tested".to_owned());

@@ -22,20 +22,21 @@ pub fn has_limit(robot: &Robot, joint: &str) -> bool {
     })
 }
 
-/// The text with the sums of the effects that a URDF holds.
+/// The text with the sums of the effects that a URDF holds, and links whose mass went to the link that they are fixed to.
 ///
 /// # Errors
 /// A text that is no XML or lacks a link or joint of the model, which no robot comes from.
-pub fn write(robot: &Robot, totals: &Totals) -> Result<String, ExportError> {
+pub fn write(robot: &Robot, totals: &Totals) -> Result<(String, Vec<String>), ExportError> {
     let document = Document::parse(robot.text).map_err(|error| ExportError::Text(error.to_string()))?;
     let root = document.root_element();
     let mut edits = Edits::new(robot.text);
+    let mut emptied = Vec::new();
     let nominal = &robot.loaded.model;
     for (j, joint) in nominal.joints().iter().enumerate() {
         let (old, new) = (&joint.inertia, &totals.model.joints()[j].inertia);
         if old != new {
             let body: Vec<&LinkFrame> = robot.loaded.links.iter().filter(|link| link.joint == Some(j)).collect();
-            inertial::correct(&mut edits, root, &body, &difference(new, old))?;
+            emptied.extend(inertial::correct(&mut edits, root, &body, &difference(new, old))?);
         }
         let missing = || ExportError::Missing("joint", joint.name.clone());
         let node = named(root, "joint", &joint.name).ok_or_else(missing)?;
@@ -63,7 +64,7 @@ pub fn write(robot: &Robot, totals: &Totals) -> Result<String, ExportError> {
     if totals.model.gravity() != GRAVITY {
         tilt(&mut edits, root, robot, totals.model.gravity());
     }
-    Ok(edits.apply())
+    Ok((edits.apply(), emptied))
 }
 
 /// Joints whose friction changes, each with its element to paste, to four digits.

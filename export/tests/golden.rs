@@ -10,7 +10,7 @@ use gapscope_export::{Robot, Target, export};
 fn mujoco_takes_the_torque_of_the_corrected_robot() {
     let loaded = robots::model("arm6").unwrap().unwrap();
     let corrected = Corrected::from_json(include_str!("../golden/corrected.json"), &loaded.model).unwrap();
-    let robot = Robot { text: robots::arm6(), loaded: &loaded, is_mjcf: false };
+    let robot = Robot { text: robots::arm6(), loaded: &loaded, is_mjcf: false, dt: gapscope_export::DT };
     let text = export(Target::Mjcf, &robot, &corrected, &[]).unwrap().text;
     assert_eq!(text, include_str!("../golden/robot.xml"), "run export/golden/make.py: MuJoCo has not seen this file");
 

@@ -51,7 +51,7 @@ fn every_kind_has_its_line_and_no_figure_without_logs() {
         alignment: 1e-4,
         effects,
     };
-    let robot = Robot { text: robots::arm6(), loaded: &loaded, is_mjcf: false };
+    let robot = Robot { text: robots::arm6(), loaded: &loaded, is_mjcf: false, dt: gapscope_export::DT };
     let how = |target: Target| {
         let ledger = export(target, &robot, &corrected, &[]).unwrap().ledger;
         assert!(ledger.notes.iter().any(|note| note.contains("1.00e-4 s")), "{:?}", ledger.notes);
@@ -67,10 +67,50 @@ fn every_kind_has_its_line_and_no_figure_without_logs() {
     };
     assert_eq!(how(Target::Urdf).0, [7, 3, 12]);
     assert_eq!(how(Target::IsaacLab).0, [8, 4, 10]);
+    assert_eq!(how(Target::C).0, [21, 0, 1]);
     let (counts, mjcf) = how(Target::Mjcf);
     // The spring of joint 5 and the play have no rotor behind them; friction by load needs logs; contact belongs to its log.
     assert_eq!(counts, [18, 1, 4]);
     let springs: Vec<_> = mjcf.effects.iter().filter(|entry| entry.kind == "joint_elasticity").collect();
     assert_eq!((springs[0].how, springs[0].joints.as_slice()), (How::Written, &["joint3".to_owned()][..]));
     assert_eq!((springs[1].how, springs[1].joints.as_slice()), (How::LeftOut, &["joint5".to_owned()][..]));
+}
+
+/// A body of two equal links, from which more is taken than either has: one takes the rest, and the ledger says so.
+#[test]
+fn links_that_lose_their_mass_are_named() {
+    let tool = |name: &str| {
+        format!(
+            r#"<link name="{name}"><inertial><origin xyz="0 0 .2"/><mass value=".2"/>
+            <inertia ixx=".02" iyy=".03" izz=".04" ixy="0" ixz="0" iyz="0"/></inertial></link>"#
+        )
+    };
+    let text = format!(
+        r#"<robot name="pair"><link name="base"/>{}{}<joint name="swing" type="continuous"><parent link="base"/><child link="left"/>
+        <axis xyz="0 1 0"/></joint><joint name="glue" type="fixed"><parent link="left"/><child link="right"/></joint></robot>"#,
+        tool("left"),
+        tool("right")
+    );
+    let loaded = gapscope_dynamics::Model::from_urdf(&text).unwrap();
+    // Three quarters of both together.
+    let effects = r#"[{"kind": "link_inertia_error", "joint": "swing", "mass_delta": -0.3, "first_moment_delta": [0, 0, -0.06],
+        "inertia_delta": [-0.042, 0, -0.057, 0, 0, -0.06]}]"#;
+    let all = |x: f64| [("swing".to_owned(), x)].into();
+    let corrected = Corrected {
+        made_from: None,
+        schema: MODEL_SCHEMA.to_owned(),
+        robot: "pair".to_owned(),
+        weights: all(1.0),
+        standstill: all(0.01),
+        band: 10.0,
+        encoder_side: EncoderSide::Link,
+        alignment: 0.0,
+        effects: serde_json::from_str(effects).unwrap(),
+    };
+    let robot = Robot { text: &text, loaded: &loaded, is_mjcf: false, dt: gapscope_export::DT };
+    let exported = export(Target::Urdf, &robot, &corrected, &[]).unwrap();
+    let notes = &exported.ledger.notes;
+    assert!(notes.iter().any(|note| note.contains("`right` has no mass of its own")), "{notes:?}");
+    let again = gapscope_dynamics::Model::from_urdf(&exported.text).unwrap();
+    assert!((again.model.joints()[0].inertia.mass - 0.1).abs() < 1e-12, "{}", exported.text);
 }

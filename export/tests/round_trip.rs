@@ -59,7 +59,7 @@ fn corrected(model: &Model, effects: Vec<Effect>) -> Corrected {
 }
 
 fn exported(target: Target, xml: &str, loaded: &Loaded, effects: Vec<Effect>) -> String {
-    let robot = Robot { text: xml, loaded, is_mjcf: false };
+    let robot = Robot { text: xml, loaded, is_mjcf: false, dt: gapscope_export::DT };
     export(target, &robot, &corrected(&loaded.model, effects), &[]).unwrap().text
 }
 
@@ -135,7 +135,7 @@ fn the_way_back_from_an_mjcf_is_the_same_as_from_the_urdf() {
     let (xml, loaded) = robots().swap_remove(1);
     let first = exported(Target::Mjcf, &xml, &loaded, vec![]);
     let again = Model::from_mjcf(&first, &|_| Err(String::new()), &[]).unwrap();
-    let robot = Robot { text: &first, loaded: &again, is_mjcf: true };
+    let robot = Robot { text: &first, loaded: &again, is_mjcf: true, dt: gapscope_export::DT };
     let effects = effects(BOTH[1], &again.model);
     let corrected = corrected(&again.model, effects.clone());
     let second = export(Target::Mjcf, &robot, &corrected, &[]).unwrap().text;

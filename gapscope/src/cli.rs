@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::index::Report;
+use crate::input::Reading;
 use crate::shell::{Completions, Manual};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gapscope_datasets::{ReferenceKind, Servo};
@@ -38,8 +39,12 @@ pub enum Command {
     Export(Export),
     /// Put all diagnoses below a folder on one page, to sort, filter and compare
     Report(Report),
+    /// Hold diagnoses against each other: which parameters differ beyond their intervals, what is common, what drifted
+    Compare(crate::compare::Compare),
     /// Look at logs: rate, gaps, jitter, steps and motion of each joint; with the robot also faults and what they determine
     Inspect(Inspect),
+    /// Write measured, nominal and corrected torque over time, for plotters: CSV, Parquet, MCAP
+    Residuals(crate::residuals::Residuals),
     /// Show how the model's error grows over the horizon, beside what one-step errors and Jacobians allow
     Rollout(Rollout),
     /// Run a study of this project's own, as its documents show it
@@ -77,12 +82,9 @@ pub struct Input {
     /// Logs: CSV, NumPy, MATLAB, Parquet, HDF5, MCAP, folders of ROS 2 bags and of LeRobot datasets
     #[arg(required = true)]
     pub logs: Vec<PathBuf>,
-    /// Read a column of another name, e.g. `position.joint1=/joint_states/j1/pos`; may be given several times
-    #[arg(long = "map", value_name = "NATIVE=COLUMN")]
-    pub map: Vec<String>,
-    /// Read column names from a TOML file
-    #[arg(long, value_name = "FILE")]
-    pub map_file: Option<PathBuf>,
+    /// How both are read
+    #[command(flatten)]
+    pub reading: Reading,
     /// Read this topic of a bag, instead of the one that is chosen; may be given several times
     #[arg(long = "topic", value_name = "TOPIC")]
     pub topic: Vec<String>,
@@ -92,12 +94,6 @@ pub struct Input {
     /// Read positions of a LeRobot dataset as per cent of the ranges in this calibration file
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
-    /// Pass an argument to xacro, where the robot description is a xacro file; may be given several times
-    #[arg(long = "xacro-arg", value_name = "NAME:=VALUE")]
-    pub xacro_args: Vec<String>,
-    /// Hold a joint of the robot fixed at zero; joints of which the logs say nothing are held by themselves
-    #[arg(long = "lock", value_name = "JOINT")]
-    pub lock: Vec<String>,
     /// Read a log that ends in the middle of a row up to its last whole row
     #[arg(long)]
     pub allow_truncated: bool,
@@ -208,24 +204,24 @@ pub struct Export {
     #[arg(long, value_name = "FILE")]
     pub robot: PathBuf,
     /// What to write, separated by commas; isaaclab needs the URDF and writes it too
-    #[arg(long, value_enum, value_name = "TARGET", value_delimiter = ',', required = true)]
+    #[arg(long, value_enum, value_name = "TARGET", value_delimiter = ',', required_unless_present = "ranges")]
     pub to: Vec<Target>,
+    /// Write a region of parameters that holds the robot with 90 %, ranges.json, and sample_ranges.py that samples it
+    #[arg(long)]
+    pub ranges: bool,
     /// Logs on which to predict what the shrink falls by in the target: best ones that the diagnosis did not see
     #[arg(long, value_name = "LOG", num_args = 1..)]
     pub logs: Vec<PathBuf>,
-    /// Read a column of another name, e.g. `position.joint1=/joint_states/j1/pos`; may be given several times
-    #[arg(long = "map", value_name = "NATIVE=COLUMN")]
-    pub map: Vec<String>,
-    /// Read column names from a TOML file
-    #[arg(long, value_name = "FILE")]
-    pub map_file: Option<PathBuf>,
-    /// Pass an argument to xacro, where the robot description is a xacro file; may be given several times
-    #[arg(long = "xacro-arg", value_name = "NAME:=VALUE")]
-    pub xacro_args: Vec<String>,
-    /// Hold a joint of the robot fixed at zero; joints that the diagnosis did not have are held by themselves
-    #[arg(long = "lock", value_name = "JOINT")]
-    pub lock: Vec<String>,
-    /// Folder for robot.urdf, robot.xml, isaaclab_robot.py and ledger.json [default: a new folder in that of the results]
+    /// How robot and logs are read
+    #[command(flatten)]
+    pub reading: Reading,
+    /// Length of a step in a target that has one of its own (c), s [default: that of the residual, or 0.001]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
+    pub dt: Option<f64>,
+    /// Residual on top of the corrected model, a folder of `gapscope train residual --with`; for the target c
+    #[arg(long, value_name = "DIR")]
+    pub residual: Option<PathBuf>,
+    /// Folder for the files of the targets and ledger.json [default: a new folder in that of the results]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Replace files that are in the folder already
@@ -242,6 +238,8 @@ pub enum Target {
     Mjcf,
     /// A configuration for Isaac Lab
     Isaaclab,
+    /// One C99 file that steps the robot
+    C,
 }
 
 impl From<Target> for gapscope_export::Target {
@@ -250,6 +248,7 @@ impl From<Target> for gapscope_export::Target {
             Target::Urdf => gapscope_export::Target::Urdf,
             Target::Mjcf => gapscope_export::Target::Mjcf,
             Target::Isaaclab => gapscope_export::Target::IsaacLab,
+            Target::C => gapscope_export::Target::C,
         }
     }
 }
@@ -495,6 +494,9 @@ pub struct Train {
     /// What a residual corrects: next-state, acceleration or torque [default: next-state]
     #[arg(long, value_parser = on, value_name = "WHAT")]
     pub on: Option<On>,
+    /// Corrected model that `diagnose` wrote, as the physics below a residual [default: the robot as described]
+    #[arg(long, value_name = "FILE")]
+    pub with: Option<PathBuf>,
     /// Reference configuration: two-hidden-128 or one-hidden-64
     #[arg(long, default_value = "two-hidden-128", value_name = "NAME")]
     pub reference: String,

@@ -1,18 +1,27 @@
 //! `gapscope export`: the corrected model for simulators, with a ledger of what they hold.
 
-use crate::cli::{Export, Input};
+use crate::cli::{Export, Input, Kind};
+use crate::input::Reading;
+use crate::learned::{self, Trained};
 use crate::robot::Description;
 use crate::{input, output, robot};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use gapscope_datasets::Episode;
 use gapscope_diagnosis::Corrected;
-use gapscope_dynamics::Loaded;
-use gapscope_export::{Exported, LEDGER_SCHEMA, Ledger, Robot, Target, TargetLedger, export};
+use gapscope_diagnosis::schema::Diagnosis;
+use gapscope_dynamics::{Loaded, Model};
+use gapscope_export::{
+    DT, Exported, LEDGER_SCHEMA, Ledger, Ranges, Robot, SAMPLER, Target, TargetLedger, export, weights as weights_for_c,
+};
 use std::fmt::Write;
 use std::path::PathBuf;
 
 /// Name of the ledger's file.
 const LEDGER: &str = "ledger.json";
+/// Names of the files with the region of parameters.
+const RANGES: [&str; 2] = ["ranges.json", "sample_ranges.py"];
+/// Name of the file with a residual's weights.
+const RESIDUAL: &str = "residual.bin";
 
 /// Writes the corrected model and its ledger; returns what to print.
 ///
@@ -37,7 +46,15 @@ pub fn run(args: &Export) -> Result<String> {
     if targets.contains(&Target::IsaacLab) && !targets.contains(&Target::Urdf) {
         targets.push(Target::Urdf);
     }
-    let files: Vec<PathBuf> = targets.iter().map(|target| target.file()).chain([LEDGER]).map(|f| out.join(f)).collect();
+    ensure!(
+        args.residual.is_none() || targets.contains(&Target::C),
+        "a residual is written for the target c alone; add it: --to c"
+    );
+    let weights = args.residual.is_some().then_some(RESIDUAL);
+    let ledger = (!targets.is_empty()).then_some(LEDGER);
+    let regions = if args.ranges { &RANGES[..] } else { &[] };
+    let names = targets.iter().map(|target| target.file()).chain(ledger).chain(weights).chain(regions.iter().copied());
+    let files: Vec<PathBuf> = names.map(|f| out.join(f)).collect();
     if let (Some(there), false) = (files.iter().find(|file| file.symlink_metadata().is_ok()), args.force) {
         bail!(
             "{} exists already; choose another folder with --out, or allow it to be replaced with --force",
@@ -49,15 +66,38 @@ pub fn run(args: &Export) -> Result<String> {
         bail!("{} is the robot description itself; choose another folder with --out", same.display());
     }
 
-    let description = robot::read(&args.robot, &args.xacro_args)?;
+    let description = robot::read(&args.robot, &args.reading.xacro_args)?;
     let loaded = loaded(args, &description, &text)?;
     let corrected = Corrected::from_json(&text, &loaded.model).with_context(|| name.to_string())?;
+    let ranges = args.ranges.then(|| ranges(&file)).transpose()?;
     let logs = logs(args, &loaded)?;
-    let robot = Robot { text: description.text(), loaded: &loaded, is_mjcf: description.is_mjcf() };
+    let residual = args.residual.as_ref().map(|path| residual(path, &loaded.model, &corrected)).transpose()?;
+    let dt = step(args.dt, residual.as_ref())?;
+    let robot = Robot { text: description.text(), loaded: &loaded, is_mjcf: description.is_mjcf(), dt };
     let exported: Vec<Exported> =
         targets.iter().map(|&target| Ok(export(target, &robot, &corrected, &logs)?)).collect::<Result<_>>()?;
     for (exported, file) in exported.iter().zip(&files) {
         output::write(file, &exported.text)?;
+    }
+    if let Some(Trained { network, on, dt, .. }) = &residual {
+        output::write_bytes(&out.join(RESIDUAL), &weights_for_c(network, *on, loaded.model.dof(), *dt))?;
+    }
+    let mut told = String::new();
+    if let Some(ranges) = &ranges {
+        let json = serde_json::to_string_pretty(ranges)? + "\n";
+        output::write(&out.join(RANGES[0]), &json)?;
+        output::write(&out.join(RANGES[1]), SAMPLER)?;
+        let _ = writeln!(
+            told,
+            "{}\n  {} parameters, a region that holds the robot with {:.0} %; {} samples it\n",
+            out.join(RANGES[0]).display(),
+            ranges.parameters.len(),
+            100.0 * ranges.probability,
+            RANGES[1]
+        );
+    }
+    if targets.is_empty() {
+        return Ok(told);
     }
     let ledger = Ledger {
         schema: LEDGER_SCHEMA.to_owned(),
@@ -66,7 +106,6 @@ pub fn run(args: &Export) -> Result<String> {
         targets: exported.into_iter().map(|exported| exported.ledger).collect(),
     };
     output::write(&out.join(LEDGER), &(serde_json::to_string_pretty(&ledger)? + "\n"))?;
-    let mut told = String::new();
     for target in &ledger.targets {
         told += &table(target, &out.join(&target.file).display().to_string());
     }
@@ -78,16 +117,69 @@ fn same_file(a: &std::path::Path, b: &std::path::Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }
 
+/// The region of parameters of the diagnosis beside a corrected model.
+fn ranges(corrected: &std::path::Path) -> Result<Ranges> {
+    let file = corrected.with_file_name("diagnosis.json");
+    let name = file.display();
+    let text = std::fs::read_to_string(&file).with_context(|| {
+        format!("cannot read {name}, which has the standard errors; give the folder that `gapscope diagnose` wrote")
+    })?;
+    let diagnosis: Diagnosis = serde_json::from_str(&text).with_context(|| {
+        format!("{name} is no diagnosis of logs with torque, whose parameters have standard errors")
+    })?;
+    Ranges::new(&diagnosis).with_context(|| {
+        format!(
+            "{name} has no standard errors: no effect was found, or another version wrote it; diagnose the logs anew"
+        )
+    })
+}
+
+/// A residual, which must have been trained on the very physics that it will stand on.
+fn residual(path: &std::path::Path, robot: &Model, corrected: &Corrected) -> Result<Trained> {
+    let trained = learned::read(path, Kind::Residual, robot)?;
+    let below = trained.physics.as_ref().map_or(&[][..], |physics| &physics.effects);
+    ensure!(
+        below == corrected.effects,
+        "{} was trained on {}, and would correct once more what the effects do; train it with \
+         `gapscope train residual … --with` the corrected.json that is exported",
+        path.display(),
+        if below.is_empty() { "the robot as described" } else { "another corrected model" }
+    );
+    let (shape, n) = ([trained.network.inputs(), trained.network.outputs()], robot.dof());
+    ensure!(
+        shape == [3 * n, trained.on.outputs(n)],
+        "{} has {} inputs and {} outputs, expected {} and {}; train it for this robot",
+        path.display(),
+        shape[0],
+        shape[1],
+        3 * n,
+        trained.on.outputs(n)
+    );
+    Ok(trained)
+}
+
+/// The length of a step, s: the one asked for, which a residual's must be.
+fn step(asked: Option<f64>, residual: Option<&Trained>) -> Result<f64> {
+    let dt = asked.or(residual.map(|residual| residual.dt)).unwrap_or(DT);
+    ensure!(dt.is_finite() && (1e-6..=1.0).contains(&dt), "--dt is {dt}, expected seconds from 0.000001 to 1");
+    if let Some(other) = residual.map(|residual| residual.dt).filter(|other| *other != dt) {
+        bail!(
+            "--dt is {dt}, but the residual was trained for steps of {other} s; leave --dt out, or train it with --dt {dt}"
+        );
+    }
+    Ok(dt)
+}
+
 /// The robot, with the joints held that the diagnosis did not have.
 fn loaded(args: &Export, description: &Description, corrected: &str) -> Result<Loaded> {
-    let loaded = description.model(&args.robot, &args.lock)?;
+    let loaded = description.model(&args.robot, &args.reading.lock)?;
     let Ok(value) = serde_json::from_str::<serde_json::Value>(corrected) else { return Ok(loaded) };
     let Some(known) = value.get("weights").and_then(|weights| weights.as_object()) else { return Ok(loaded) };
     let absent = loaded.model.joints().iter().map(|joint| &joint.name).filter(|name| !known.contains_key(*name));
-    let mut held = args.lock.clone();
+    let mut held = args.reading.lock.clone();
     held.extend(absent.cloned());
     // Where none of the joints is known it is another robot, which reading the corrections says better.
-    if held.len() == args.lock.len() || held.len() - args.lock.len() == loaded.model.dof() {
+    if held.len() == args.reading.lock.len() || held.len() - args.reading.lock.len() == loaded.model.dof() {
         return Ok(loaded);
     }
     description.model(&args.robot, &held)
@@ -99,18 +191,11 @@ fn logs(args: &Export, loaded: &Loaded) -> Result<Vec<Episode>> {
         return Ok(Vec::new());
     }
     let locked = |name: &String| loaded.model.joint_index(name).is_none();
-    let whole = robot::read(&args.robot, &args.xacro_args)?.model(&args.robot, &args.lock)?;
-    let mut lock = args.lock.clone();
+    let whole = robot::read(&args.robot, &args.reading.xacro_args)?.model(&args.robot, &args.reading.lock)?;
+    let mut lock = args.reading.lock.clone();
     lock.extend(whole.model.joints().iter().map(|joint| joint.name.clone()).filter(|name| locked(name)));
-    let input = Input {
-        robot: args.robot.clone(),
-        logs: args.logs.clone(),
-        map: args.map.clone(),
-        map_file: args.map_file.clone(),
-        xacro_args: args.xacro_args.clone(),
-        lock,
-        ..Input::default()
-    };
+    let reading = Reading { lock, ..args.reading.clone() };
+    let input = Input { robot: args.robot.clone(), logs: args.logs.clone(), reading, ..Input::default() };
     let read = input::load(&input)?;
     if read.model.dof() != loaded.model.dof() {
         bail!("the logs lack joints that the diagnosis had; give logs of all {} joints", loaded.model.dof());
@@ -186,6 +271,7 @@ mod tests {
     fn run(words: &[&str]) -> Result<String> {
         match Cli::try_parse_from(["gapscope"].iter().chain(words)).unwrap().command {
             Command::Generate(args) => crate::generate::run(&args),
+            Command::Train(args) => crate::train::run(&args),
             Command::Export(args) => super::run(&args),
             _ => unreachable!(),
         }
@@ -284,5 +370,69 @@ mod tests {
         run(&["export", path(folder), "--robot", path(&other), "--to", "mjcf"]).unwrap();
         let text = std::fs::read_to_string(folder.join("export/robot.xml")).unwrap();
         assert!(text.contains("\"joint2\"") && !text.contains("\"joint3\""), "{text}");
+    }
+
+    #[test]
+    fn a_residual_goes_out_with_the_physics_that_it_was_trained_on() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path();
+        case(folder);
+        let (robot, log) = (folder.join("logs/robot.urdf"), folder.join("logs/episode_0.csv"));
+        let train = |out: &str, more: &[&str]| {
+            let out = folder.join(out);
+            let words =
+                ["train", "residual", path(&robot), path(&log), "--hidden", "4", "--epochs", "1", "--dt", "0.01"];
+            run(&[&words[..], &["--out", path(&out)], more].concat()).unwrap();
+            out
+        };
+        let export = |residual: &Path, to: &str, more: &[&str]| {
+            let out = folder.join("c");
+            let words = ["export", path(folder), "--robot", path(&robot), "--to", to, "--force", "--out", path(&out)];
+            run(&[&words[..], &["--residual", path(residual)], more].concat()).map_err(|error| format!("{error:#}"))
+        };
+        let corrected = folder.join("corrected.json");
+        let (bare, own) = (train("bare", &[]), train("own", &["--with", path(&corrected)]));
+        let refused = |told: Result<String, String>, part: &str| {
+            let error = told.unwrap_err();
+            assert!(error.contains(part), "{error}");
+        };
+        refused(export(&bare, "c", &[]), "the robot as described");
+        refused(export(&own, "mjcf", &[]), "--to c");
+        refused(export(&own, "c", &["--dt", "0.02"]), "steps of 0.01 s");
+        refused(export(&own, "c", &["--dt", "-1"]), "--dt is -1");
+        export(&own, "c", &[]).unwrap();
+        let text = std::fs::read_to_string(folder.join("c/robot.c")).unwrap();
+        assert!(text.contains("#define GAPSCOPE_DT 0.01\n"), "{}", &text[..1000]);
+        assert!(std::fs::read(folder.join("c/residual.bin")).unwrap().starts_with(b"GSRESID1"));
+    }
+
+    #[test]
+    fn ranges_come_from_a_diagnosis_with_standard_errors() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path();
+        case(folder);
+        let (robot, log) = (folder.join("logs/robot.urdf"), folder.join("logs/episode_0.csv"));
+        let words = ["export", path(folder), "--robot", path(&robot), "--ranges"];
+        let error = format!("{:#}", run(&words).unwrap_err());
+        assert!(error.contains("diagnosis.json, which has the standard errors"), "{error}");
+        std::fs::write(folder.join("diagnosis.json"), "{}").unwrap();
+        let error = format!("{:#}", run(&words).unwrap_err());
+        assert!(error.contains("no diagnosis of logs with torque"), "{error}");
+        let model = gapscope_dynamics::Model::from_urdf(&std::fs::read_to_string(&robot).unwrap()).unwrap().model;
+        let joints: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+        let logs = gapscope_datasets::read_logs(&[log], &joints, &gapscope_datasets::ReadOptions::default()).unwrap().0;
+        let found = gapscope_diagnosis::diagnose(&model, &logs, Vec::new(), &|_: &str, _: f64| {}).unwrap();
+        std::fs::write(folder.join("diagnosis.json"), serde_json::to_string(&found.diagnosis).unwrap()).unwrap();
+        let told = run(&words).unwrap();
+        let text = std::fs::read_to_string(folder.join("export/ranges.json")).unwrap();
+        let ranges: Ranges = serde_json::from_str(&text).unwrap();
+        assert!(told.contains(&format!("{} parameters", ranges.parameters.len())), "{told}");
+        assert!(folder.join("export/sample_ranges.py").exists() && !folder.join("export/ledger.json").exists());
+        // The estimate lies in the middle, and an interval of friction is narrower than its range.
+        let middle: Vec<f64> = ranges.parameters.iter().map(|p| p.value).collect();
+        assert!(ranges.distance(&middle).unwrap() < 1e-9);
+        let coulomb = ranges.parameters.iter().find(|p| p.name() == "coulomb_friction.coulomb.joint1").unwrap();
+        assert!(coulomb.error > 0.0 && (coulomb.value - 0.2).abs() < 4.0 * coulomb.error, "{coulomb:?}");
+        assert!(coulomb.range[1] - coulomb.range[0] > 2.0 * 1.96 * coulomb.error);
     }
 }

@@ -3,6 +3,7 @@
 use crate::cli::Input;
 use crate::robot::{self, Description};
 use anyhow::{Context, Result, bail};
+use clap::Args;
 use gapscope_datasets::{
     Calibration, ColumnMap, Doubt, Episode, Fault, Faults, LONGEST_STEP, LogError, ReadOptions, check_logs, digest,
     find_faults, mend, read_arrays, read_logs,
@@ -10,6 +11,24 @@ use gapscope_datasets::{
 use gapscope_diagnosis::Origin;
 use gapscope_dynamics::{Finding, Model};
 use std::io::Write;
+use std::path::PathBuf;
+
+/// How a robot and its logs are read, for every command that does.
+#[derive(Debug, Clone, Default, Args)]
+pub struct Reading {
+    /// Read a column of another name, e.g. `position.joint1=/joint_states/j1/pos`; may be given several times
+    #[arg(long = "map", value_name = "NATIVE=COLUMN")]
+    pub map: Vec<String>,
+    /// Read column names from a TOML file
+    #[arg(long, value_name = "FILE")]
+    pub map_file: Option<PathBuf>,
+    /// Pass an argument to xacro, where the robot description is a xacro file; may be given several times
+    #[arg(long = "xacro-arg", value_name = "NAME:=VALUE")]
+    pub xacro_args: Vec<String>,
+    /// Hold a joint of the robot fixed at zero; joints of which logs or diagnosis say nothing are held by themselves
+    #[arg(long = "lock", value_name = "JOINT")]
+    pub lock: Vec<String>,
+}
 
 /// What the command line named, read and checked.
 pub struct Loaded {
@@ -89,8 +108,8 @@ pub fn load_any(input: &Input) -> Result<Loaded> {
 }
 
 fn load_with(input: &Input, options: ReadOptions) -> Result<Loaded> {
-    let description = robot::read(&input.robot, &input.xacro_args)?;
-    let mut locked = input.lock.clone();
+    let description = robot::read(&input.robot, &input.reading.xacro_args)?;
+    let mut locked = input.reading.lock.clone();
     let mut said = Vec::new();
     loop {
         let robot = description.model(&input.robot, &locked)?;
@@ -177,11 +196,11 @@ fn checked(
 /// # Errors
 /// A column map, a range or a calibration that cannot be read.
 pub fn options(input: &Input) -> Result<ReadOptions> {
-    let mut map = match &input.map_file {
+    let mut map = match &input.reading.map_file {
         Some(file) => ColumnMap::from_toml_file(file)?,
         None => ColumnMap::default(),
     };
-    map = map.overlaid(ColumnMap::from_pairs(&input.map)?);
+    map = map.overlaid(ColumnMap::from_pairs(&input.reading.map)?);
     Ok(ReadOptions {
         map,
         topics: input.topic.clone(),

@@ -1,7 +1,7 @@
 //! `gapscope inspect`: what logs are like, what is wrong with them, and what they determine.
 
 use crate::cli::{Input, Inspect};
-use crate::input::{fault_line, load, options, read};
+use crate::input::{Reading, fault_line, load, options, read};
 use crate::report::terminal::{column, fill, pad};
 use crate::report::{count, figure, percent, plain};
 use anyhow::{Context, Result};
@@ -35,11 +35,14 @@ pub fn run(args: &Inspect) -> Result<String> {
     let input = Input {
         robot: args.model.clone().unwrap_or_default(),
         logs: args.logs.clone(),
-        map: args.map.clone(),
-        map_file: args.map_file.clone(),
+        reading: Reading {
+            map: args.map.clone(),
+            map_file: args.map_file.clone(),
+            lock: args.lock.clone(),
+            ..Reading::default()
+        },
         topic: args.topic.clone(),
         episodes: args.episodes.clone(),
-        lock: args.lock.clone(),
         ..Input::default()
     };
     let inspection = inspected(&input)?;

@@ -2,7 +2,7 @@
 
 use crate::cli::Kind;
 use anyhow::{Context, Result, bail, ensure};
-use gapscope_diagnosis::Contender;
+use gapscope_diagnosis::{Contender, Corrected};
 use gapscope_dynamics::Model;
 use gapscope_effects::Plant;
 use gapscope_network::{Mlp, Net, from_json, from_safetensors};
@@ -20,6 +20,20 @@ struct Setting {
     joints: Vec<String>,
     /// Time of a step, s.
     dt: f64,
+    /// Corrections of the physics that the residual was trained on.
+    physics: Option<serde_json::Value>,
+}
+
+/// What a folder that `gapscope train` wrote holds.
+pub struct Trained {
+    /// The weights.
+    pub network: Mlp<f32>,
+    /// What a residual corrects.
+    pub on: On,
+    /// Time of a step, s.
+    pub dt: f64,
+    /// Corrections of the physics that a residual was trained on; `None` for the robot as described.
+    pub physics: Option<Corrected>,
 }
 
 /// The model of `kind` in a folder that `gapscope train` wrote, or with other weights of that folder (safetensors or JSON):
@@ -32,28 +46,33 @@ pub fn load(path: &Path, kind: Kind, robot: &Model) -> Result<Contender> {
     if kind == Kind::Residual {
         return Ok(Contender::with_own_step("hybrid", residual(path, robot)?));
     }
-    let Read { network, setting, place } = read(path, kind, robot)?;
-    let pure = Pure::new(setting.joints.len(), setting.dt, network).with_context(|| place)?;
+    let Trained { network, dt, .. } = read(path, kind, robot)?;
+    let pure = Pure::new(robot.dof(), dt, Net::new(network)).with_context(|| unfit(path))?;
     Ok(Contender::with_own_step("pure", pure))
 }
 
-/// The residual in such a folder, on the robot's own model.
+/// The residual in such a folder, on the physics that it was trained on.
 ///
 /// # Errors
 /// As those of [`load`].
 pub fn residual(path: &Path, robot: &Model) -> Result<Hybrid<Plant, Net<f32>>> {
-    let Read { network, setting, place } = read(path, Kind::Residual, robot)?;
-    Hybrid::new(Plant::nominal(robot, setting.dt), network, setting.on.unwrap_or_default()).with_context(|| place)
+    let Trained { network, on, dt, physics } = read(path, Kind::Residual, robot)?;
+    let plant = match &physics {
+        Some(corrected) => corrected.plant(robot, dt)?,
+        None => Plant::nominal(robot, dt),
+    };
+    Hybrid::new(plant, Net::new(network), on).with_context(|| unfit(path))
 }
 
-/// A network with what it was trained for, and what to say where the two do not go together.
-struct Read {
-    network: Net<f32>,
-    setting: Setting,
-    place: String,
+fn unfit(path: &Path) -> String {
+    format!("the weights in {} do not fit training.json beside them", path.display())
 }
 
-fn read(path: &Path, kind: Kind, robot: &Model) -> Result<Read> {
+/// What a folder that `gapscope train` wrote holds for a robot.
+///
+/// # Errors
+/// As those of [`load`].
+pub fn read(path: &Path, kind: Kind, robot: &Model) -> Result<Trained> {
     let weights = if path.is_dir() { path.join("weights.safetensors") } else { path.to_owned() };
     let network = network(&weights)?;
     let record = weights.with_file_name("training.json");
@@ -76,16 +95,17 @@ fn read(path: &Path, kind: Kind, robot: &Model) -> Result<Read> {
     );
     let dt = setting.dt;
     ensure!(dt.is_finite() && dt > 0.0, "{}: its step dt is {dt}, expected seconds above zero", record.display());
-    let place = format!("{} does not fit {}", weights.display(), record.display());
-    Ok(Read { network, setting, place })
+    let physics = setting.physics.map(|value| Corrected::from_json(&value.to_string(), robot)).transpose();
+    let on = setting.on.unwrap_or_default();
+    Ok(Trained { network, on, dt, physics: physics.with_context(wrong)? })
 }
 
-fn network(weights: &Path) -> Result<Net<f32>> {
+fn network(weights: &Path) -> Result<Mlp<f32>> {
     let bytes = std::fs::read(weights).with_context(|| format!("cannot read the weights {}", weights.display()))?;
     let network: Result<Mlp<f32>> = match weights.extension().and_then(|e| e.to_str()) {
         Some("safetensors") => from_safetensors(&bytes).map_err(Into::into),
         Some("json") => String::from_utf8(bytes).map_err(Into::into).and_then(|text| Ok(from_json(&text)?)),
         _ => bail!("{}: weights are read from .safetensors and .json files", weights.display()),
     };
-    Ok(Net::new(network.with_context(|| format!("{} holds no weights", weights.display()))?))
+    network.with_context(|| format!("{} holds no weights", weights.display()))
 }

@@ -3,6 +3,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod cli;
+mod compare;
 mod demo;
 pub mod diagnose;
 pub mod evaluate;
@@ -15,6 +16,7 @@ pub mod learned;
 mod output;
 mod picture;
 mod report;
+mod residuals;
 pub mod robot;
 pub mod rollout;
 mod servo;
@@ -38,6 +40,8 @@ pub fn run(command: &Command) -> anyhow::Result<String> {
         Command::Report(args) => index::run(args),
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::manual(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Residuals(args) => residuals::run(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Rollout(args) => rollout::run(args),
         Command::Study(study) => study::run(study),

@@ -8,6 +8,7 @@ use crate::report::axis::Axis;
 use crate::report::figure;
 use anyhow::{Context, Result, bail};
 use gapscope_datasets::transitions;
+use gapscope_diagnosis::Corrected;
 use gapscope_dynamics::{Model, StepModel, Transitions};
 use gapscope_effects::Plant;
 use gapscope_network::{Epoch, Learner, Mlp, Net, to_json, to_onnx, to_safetensors};
@@ -40,6 +41,9 @@ struct Record<'a> {
     joints: Vec<&'a str>,
     /// Time of a step, s.
     dt: f64,
+    /// Corrections of the physics that the residual is on top of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    physics: Option<&'a Corrected>,
     rows: [usize; 2],
     learner: &'a Learner,
     best_epoch: usize,
@@ -96,6 +100,9 @@ fn checked(args: &Train) -> Result<(Learner, On)> {
     if args.kind == Kind::Pure && args.on.is_some() {
         bail!("--on is about what a residual corrects; a pure network learns the next state");
     }
+    if args.kind == Kind::Pure && args.with.is_some() {
+        bail!("--with is about the physics below a residual; a pure network has none");
+    }
     if !(args.dt > 0.0 && args.dt.is_finite()) {
         bail!("--dt is {}; expected a positive time in s", args.dt);
     }
@@ -126,7 +133,11 @@ pub fn trained(args: &Train, loaded: &Loaded, heard: &mut dyn FnMut(&Epoch)) -> 
         bail!("the logs hold {} steps of {} s; at least 10 are needed", train.len() + held_out.len(), args.dt);
     }
 
-    let mut physics = Plant::nominal(&loaded.model, args.dt);
+    let corrected = args.with.as_ref().map(|file| corrected(file, &loaded.model)).transpose()?;
+    let mut physics = match &corrected {
+        Some(corrected) => corrected.plant(&loaded.model, args.dt)?,
+        None => Plant::nominal(&loaded.model, args.dt),
+    };
     let before = velocity_rms(&held_out, &mut physics);
     let (trained, after) = match args.kind {
         Kind::Residual => {
@@ -152,6 +163,7 @@ pub fn trained(args: &Train, loaded: &Loaded, heard: &mut dyn FnMut(&Epoch)) -> 
         robot: loaded.model.name(),
         joints: names(&loaded.model),
         dt: args.dt,
+        physics: corrected.as_ref(),
         rows: [train.len(), held_out.len()],
         learner: &learner,
         best_epoch: trained.best,
@@ -184,6 +196,13 @@ fn folder(args: &Train, first: &std::path::Path) -> Result<PathBuf> {
         );
     }
     Ok(out.clone())
+}
+
+/// A correction that `diagnose` wrote, for a robot.
+fn corrected(file: &std::path::Path, robot: &Model) -> Result<Corrected> {
+    let name = || file.display().to_string();
+    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", name()))?;
+    Corrected::from_json(&text, robot).with_context(name)
 }
 
 fn learner(args: &Train) -> Result<Learner> {

@@ -41,7 +41,8 @@ fn exported(target: Target, mut given: Input, joints: &[String], corrected: &str
     let loaded = description.model(&given.robot, &given.lock)?;
     let corrected = Corrected::from_json(corrected, &loaded.model)?;
     let logs = if given.logs.is_empty() { Vec::new() } else { input::load(&given)?.episodes };
-    let robot = Robot { text: description.text(), loaded: &loaded, is_mjcf: description.is_mjcf() };
+    let robot =
+        Robot { text: description.text(), loaded: &loaded, is_mjcf: description.is_mjcf(), dt: gapscope_export::DT };
     let exported = gapscope_export::export(target, &robot, &corrected, &logs)?;
     Ok((exported.text, serde_json::to_string(&exported.ledger)?))
 }

@@ -2,17 +2,17 @@
 
 /// The actuation chain of a plant.
 #[derive(Debug, Clone)]
-pub(crate) struct Actuation {
+pub struct Actuation {
     /// Delay D in s.
-    pub(crate) delay: f64,
+    pub delay: f64,
     /// Time constant T of the lag in s; 0 where there is none.
-    pub(crate) lag: f64,
+    pub lag: f64,
     /// Per joint.
-    pub(crate) gain: Vec<f64>,
+    pub gain: Vec<f64>,
     /// Per joint, N m (N).
-    pub(crate) bias: Vec<f64>,
+    pub bias: Vec<f64>,
     /// Per joint, N m (N); infinite where there is none.
-    pub(crate) limit: Vec<f64>,
+    pub limit: Vec<f64>,
 }
 
 impl Actuation {
@@ -27,7 +27,7 @@ impl Actuation {
     }
 
     /// The delay in steps of `dt`: whole steps, and the fraction of a step beyond them.
-    fn steps(&self, dt: f64) -> (usize, f64) {
+    pub(super) fn steps(&self, dt: f64) -> (usize, f64) {
         let steps = self.delay / dt;
         let whole = (steps + 1e-9).floor();
         let fraction = steps - whole;

@@ -10,24 +10,25 @@ const TOLERANCE: f64 = 1e-10;
 
 /// A combination of joint speeds s = Σ weight · q̇_joint and what acts along it.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Direction {
-    pub(super) parts: Vec<(usize, f64)>,
+pub struct Direction {
+    /// Indices of joints with their weights.
+    pub parts: Vec<(usize, f64)>,
     /// b in −b s, N m s/rad.
-    pub(crate) viscous: f64,
+    pub viscous: f64,
     /// I in −I ṡ, kg m².
-    pub(crate) inertia: f64,
+    pub inertia: f64,
     /// f in −f sign s, N m.
-    pub(crate) coulomb: f64,
+    pub coulomb: f64,
     /// What standstill adds to f, N m; it fades with e^{−(s/v)²}.
-    pub(crate) static_rise: f64,
+    pub static_rise: f64,
     /// v of the static rise, rad/s.
-    pub(crate) stribeck_velocity: f64,
+    pub stribeck_velocity: f64,
     /// What the start of the episode adds to f, N m; it fades with e^{−t/T}.
-    pub(crate) cold_rise: f64,
+    pub cold_rise: f64,
     /// T of the cold rise, s.
-    pub(crate) time_constant: f64,
+    pub time_constant: f64,
     /// What each N m of delivered effort of the first joint adds to f.
-    pub(crate) load: f64,
+    pub load: f64,
 }
 
 impl Direction {
@@ -68,12 +69,13 @@ impl Direction {
 
 /// Bristles on one joint: Dahl's friction, ż = s − σ abs(s) z / f with the force −σ z.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Bristle {
-    pub(crate) joint: usize,
+pub struct Bristle {
+    /// Index of the joint.
+    pub joint: usize,
     /// f, N m.
-    pub(crate) coulomb: f64,
+    pub coulomb: f64,
     /// σ, N m/rad.
-    pub(crate) stiffness: f64,
+    pub stiffness: f64,
 }
 
 impl Bristle {

@@ -6,6 +6,7 @@
 
 mod actuation;
 mod drive;
+mod elements;
 mod friction;
 mod jacobian;
 mod residual;
@@ -14,11 +15,12 @@ mod step;
 
 pub(crate) use drive::CONTACT;
 pub use drive::Transmission;
-pub(crate) use friction::{Bristle, Direction};
+pub use elements::Elements;
+pub use friction::{Bristle, Direction};
 
 use crate::effect::check;
 use crate::{Effect, EffectError, Kind};
-use actuation::Actuation;
+pub use actuation::Actuation;
 use drive::Drive;
 use friction::Row;
 use gapscope_dynamics::{Data, Inertia, Model};
@@ -71,11 +73,15 @@ pub struct Plant {
 
 /// amplitude · sin(cycles · q + phase) on one joint.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Ripple {
-    pub(crate) joint: usize,
-    pub(crate) amplitude: f64,
-    pub(crate) cycles: f64,
-    pub(crate) phase: f64,
+pub struct Ripple {
+    /// Index of the joint.
+    pub joint: usize,
+    /// N m (N).
+    pub amplitude: f64,
+    /// Per radian (m) of the joint's true position.
+    pub cycles: f64,
+    /// rad.
+    pub phase: f64,
 }
 
 impl Ripple {

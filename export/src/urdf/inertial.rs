@@ -12,29 +12,37 @@ use roxmltree::Node;
 ///
 /// `delta` is what is added, in the frame of the moved link; links other than those that take it keep their bytes. The
 /// moved link takes it where it stays a body with it, else the first other link that does. Where none does, the moved link
-/// takes the inertia of them all, and the others are left without.
+/// takes the inertia of them all, and the others are left without: their names are returned.
 ///
 /// # Errors
 /// A link of the body that the text does not have.
-pub fn correct(edits: &mut Edits, robot: Node, body: &[&LinkFrame], delta: &Inertia) -> Result<(), ExportError> {
+pub fn correct(
+    edits: &mut Edits,
+    robot: Node,
+    body: &[&LinkFrame],
+    delta: &Inertia,
+) -> Result<Vec<String>, ExportError> {
     let own: Vec<Inertia> = body.iter().map(|link| of_link(robot, &link.name)).collect();
     let taker = body.iter().zip(&own).position(|(link, own)| own.add(&seen_from(link, delta)).is_physical());
     if let Some(taker) = taker {
         let new = own[taker].add(&seen_from(body[taker], delta));
-        return write(edits, robot, &body[taker].name, &new);
+        write(edits, robot, &body[taker].name, &new)?;
+        return Ok(Vec::new());
     }
     let mut sum = *delta;
     for (link, own) in body.iter().zip(&own) {
         sum = sum.add(&own.transform(&link.placement));
     }
+    let mut emptied = Vec::new();
     for (i, (link, own)) in body.iter().zip(&own).enumerate() {
         if i == 0 {
             write(edits, robot, &link.name, &sum)?;
         } else if *own != Inertia::ZERO {
             write(edits, robot, &link.name, &Inertia::ZERO)?;
+            emptied.push(link.name.clone());
         }
     }
-    Ok(())
+    Ok(emptied)
 }
 
 /// The inertia of the moved link's frame in the frame of a link that is fixed to it.

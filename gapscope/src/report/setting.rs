@@ -31,7 +31,8 @@ impl Setting {
         loaded: Option<&Loaded>,
     ) -> Setting {
         let ledger = loaded.and_then(|loaded| {
-            let robot = Robot { text: description.text(), loaded, is_mjcf: description.is_mjcf() };
+            let robot =
+                Robot { text: description.text(), loaded, is_mjcf: description.is_mjcf(), dt: gapscope_export::DT };
             // A robot that has no URDF has nothing to paste into it.
             Some(export(Target::Urdf, &robot, corrected, &[]).ok()?.ledger)
         });

@@ -74,6 +74,7 @@ pub fn explained() -> Case {
                 "effort looks like motor current times a constant: no torque sensor on the link side".into(),
             ],
         },
+        covariance: None,
         verdict: Verdict::Explained,
         gap: gap(&names, &rms, regimes(&names)),
         effects: vec![coulomb_effect, payload, viscous_effect, delay],

@@ -1,0 +1,154 @@
+"""Robots like the one that was diagnosed: samples of the region in ranges.json, for randomisation.
+
+    ranges = Ranges()                       # ranges.json beside this file
+    sample = ranges.sample(numpy.random.default_rng(0))
+    left_out = ranges.to_mujoco(model, sample)      # a mujoco.MjModel of robot.xml, loaded anew for each sample
+
+Written by gapscope. Needs NumPy. `to_isaaclab` was not run where it was written.
+"""
+
+import json
+import pathlib
+
+import numpy as np
+
+
+class Ranges:
+    """The region |F^-1 (p - value)| <= radius of the parameters p."""
+
+    def __init__(self, file=pathlib.Path(__file__).with_name("ranges.json")):
+        told = json.loads(pathlib.Path(file).read_text())
+        self.parameters = told["parameters"]
+        self.factor = np.array(told["factor"])
+        self.radius = told["radius"]
+        self.value = np.array([p["value"] for p in self.parameters])
+
+    def sample(self, rng):
+        """A robot from the region, evenly over its volume: one number a parameter, in their order and units."""
+        along = rng.standard_normal(len(self.value))
+        along *= self.radius * rng.random() ** (1 / len(along)) / np.linalg.norm(along)
+        return self.value + self.factor @ along
+
+    def holds(self, sample):
+        """Whether a robot is in the region."""
+        return np.linalg.norm(np.linalg.solve(self.factor, sample - self.value)) <= self.radius * (1 + 1e-9)
+
+    def named(self, sample):
+        """(kind, parameter, joint, component) of each number with its estimate and its sample."""
+        for p, value, x in zip(self.parameters, self.value, sample):
+            yield (p["kind"], p["parameter"], p.get("joint"), p.get("component")), value, x
+
+    def to_mujoco(self, model, sample):
+        """Puts a sample in the place of the estimates in a MjModel of robot.xml. Returns what the model has no place for."""
+        import mujoco
+
+        of = lambda kind, name: mujoco.mj_name2id(model, kind, name)
+        left_out, bodies, tilt = [], {}, {}
+        for (kind, parameter, joint, component), value, x in self.named(sample):
+            change, name = x - value, kind + "." + parameter
+            j = of(mujoco.mjtObj.mjOBJ_JOINT, joint) if joint else -1
+            drive = of(mujoco.mjtObj.mjOBJ_ACTUATOR, joint) if joint else -1
+            motor = of(mujoco.mjtObj.mjOBJ_JOINT, joint + "_motor") if joint else -1
+            dof = model.jnt_dofadr[j] if j >= 0 else -1
+            if name == "viscous_friction.viscous" and j >= 0:
+                model.dof_damping[dof] = max(0.0, model.dof_damping[dof] + change)
+            elif name == "coulomb_friction.coulomb" and j >= 0:
+                model.dof_frictionloss[dof] = max(0.0, model.dof_frictionloss[dof] + change)
+            elif name == "armature.armature" and j >= 0:
+                turning = model.jnt_dofadr[motor] if motor >= 0 else dof
+                model.dof_armature[turning] = max(0.0, model.dof_armature[turning] + change)
+            elif name == "torque_gain_error.gain" and drive >= 0:
+                model.actuator_gainprm[drive, 0] *= x / value
+            elif name == "torque_bias.bias" and drive >= 0:
+                model.actuator_biasprm[drive, 0] += change
+            elif name == "torque_saturation.limit" and drive >= 0:
+                model.actuator_forcerange[drive] = -x, x
+            elif name == "actuator_lag.time_constant":
+                model.actuator_dynprm[:, 0] = np.maximum(1e-6, model.actuator_dynprm[:, 0] + change)
+            elif name == "parallel_spring.stiffness" and j >= 0:
+                model.jnt_stiffness[j] = max(0.0, model.jnt_stiffness[j] + change)
+            elif name == "parallel_spring.rest_position" and j >= 0:
+                model.qpos_spring[model.jnt_qposadr[j]] += change
+            elif kind == "gravity_misalignment":
+                tilt[parameter] = x
+            elif kind in ("link_inertia_error", "payload") and j >= 0:
+                bodies.setdefault((kind, model.jnt_bodyid[j]), {})[parameter, component] = (value, x)
+            else:
+                left_out.append(name + (f".{joint}" if joint else ""))
+        if tilt:
+            roll, pitch = tilt.get("roll", 0.0), tilt.get("pitch", 0.0)
+            size = np.linalg.norm(model.opt.gravity)
+            down = np.sin(pitch), -np.sin(roll) * np.cos(pitch), -np.cos(roll) * np.cos(pitch)
+            model.opt.gravity = size * np.array(down)
+        for (kind, body), numbers in bodies.items():
+            before, after = (_body(kind, numbers, which) for which in (0, 1))
+            if not _add(model, body, after - before):
+                left_out.append(f"{kind} (that of no body, left as it was)")
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        return left_out
+
+    def to_isaaclab(self, articulation, sample, env_ids=None):
+        """Puts a sample into an Isaac Lab 2.3 `Articulation`. Returns what it has no place for. NOT RUN where it was written."""
+        left_out = []
+        writers = {
+            "viscous_friction.viscous": "write_joint_viscous_friction_coefficient_to_sim",
+            "coulomb_friction.coulomb": "write_joint_friction_coefficient_to_sim",
+            "armature.armature": "write_joint_armature_to_sim",
+            "torque_saturation.limit": "write_joint_effort_limit_to_sim",
+        }
+        for (kind, parameter, joint, component), value, x in self.named(sample):
+            writer = writers.get(f"{kind}.{parameter}")
+            if writer is None or joint not in articulation.joint_names:
+                left_out.append(f"{kind}.{parameter}" + (f".{joint}" if joint else ""))
+                continue
+            getattr(articulation, writer)(max(0.0, x), joint_ids=[articulation.joint_names.index(joint)], env_ids=env_ids)
+        return left_out
+
+
+def _symmetric(six):
+    """(xx, xy, yy, xz, yz, zz) as a matrix."""
+    xx, xy, yy, xz, yz, zz = six
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _pseudo(mass, moment, inertia):
+    """Mass, first moment and inertia about the origin as one matrix, in which bodies add up."""
+    out = np.empty((4, 4))
+    out[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    out[:3, 3] = out[3, :3] = moment
+    out[3, 3] = mass
+    return out
+
+
+def _body(kind, numbers, which):
+    get = lambda name, count: np.array([numbers.get((name, i), (0.0, 0.0))[which] for i in range(count)])
+    scalar = lambda name: numbers.get((name, None), (0.0, 0.0))[which]
+    if kind == "link_inertia_error":
+        return _pseudo(scalar("mass_delta"), get("first_moment_delta", 3), _symmetric(get("inertia_delta", 6)))
+    # The inertia of a payload is about its centre of mass.
+    mass, com = scalar("mass"), get("com", 3)
+    about = _symmetric(get("inertia", 6)) + mass * (com @ com * np.eye(3) - np.outer(com, com))
+    return _pseudo(mass, mass * com, about)
+
+
+def _add(model, body, change):
+    """Adds to a body; False, and nothing done, where no body would be left."""
+    import mujoco
+
+    turned = np.empty(9)
+    mujoco.mju_quat2Mat(turned, model.body_iquat[body])
+    turned = turned.reshape(3, 3)
+    mass, com = model.body_mass[body], model.body_ipos[body]
+    about = turned @ np.diag(model.body_inertia[body]) @ turned.T + mass * (com @ com * np.eye(3) - np.outer(com, com))
+    whole = _pseudo(mass, mass * com, about) + change
+    if np.linalg.eigvalsh(whole)[0] <= 0.0:
+        return False
+    mass, com = whole[3, 3], whole[:3, 3] / whole[3, 3]
+    spread = whole[:3, :3] - mass * np.outer(com, com)
+    size, axes = np.linalg.eigh(np.trace(spread) * np.eye(3) - spread)
+    axes[:, 2] *= np.linalg.det(axes)
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    model.body_mass[body], model.body_ipos[body] = mass, com
+    model.body_iquat[body], model.body_inertia[body] = quaternion, size
+    return True

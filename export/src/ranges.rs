@@ -13,6 +13,9 @@ pub const SAMPLER: &str = include_str!("ranges.py");
 
 /// How often the region is to hold the robot.
 const PROBABILITY: f64 = 0.9;
+/// Radii of a normal distribution within which that part of simulated robots lies (31 double pendulums of
+/// `tests/export/ranges.py`): what a diagnosis leaves out or takes for another effect moves all the rest.
+const WIDER: f64 = 2.0;
 /// No combination of parameters is taken as known to better than this part of what its parameters are: correlations are
 /// written to six digits.
 const LEAST: f64 = 1e-5;
@@ -76,7 +79,7 @@ impl Ranges {
         if known.is_empty() || told.correlation.len() != told.parameters.len() {
             return None;
         }
-        let radius = ChiSquared::new(known.len() as f64).ok()?.inverse_cdf(PROBABILITY).sqrt();
+        let radius = ChiSquared::new(known.len() as f64).ok()?.inverse_cdf(PROBABILITY).sqrt() * WIDER;
         let factor = factor(told, &known)?;
         let of = |i: usize| {
             let p = &told.parameters[i];

@@ -34,11 +34,11 @@ pub fn export(
 }
 
 fn exported(target: Target, mut given: Input, joints: &[String], corrected: &str) -> Result<(String, String)> {
-    let description = robot::read(&given.robot, &given.xacro_args)?;
-    let whole = description.model(&given.robot, &given.lock)?;
+    let description = robot::read(&given.robot, &given.reading.xacro_args)?;
+    let whole = description.model(&given.robot, &given.reading.lock)?;
     let absent = whole.model.joints().iter().map(|joint| &joint.name).filter(|name| !joints.contains(name));
-    given.lock.extend(absent.cloned());
-    let loaded = description.model(&given.robot, &given.lock)?;
+    given.reading.lock.extend(absent.cloned());
+    let loaded = description.model(&given.robot, &given.reading.lock)?;
     let corrected = Corrected::from_json(corrected, &loaded.model)?;
     let logs = if given.logs.is_empty() { Vec::new() } else { input::load(&given)?.episodes };
     let robot =

@@ -1,6 +1,7 @@
 //! What the Python side passes of robot and logs, as the command line's arguments.
 
 use gapscope::cli::Input;
+use gapscope::input::Reading;
 use gapscope_datasets::Arrays;
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -57,13 +58,15 @@ impl Given<'_> {
         Ok(Input {
             robot: self.robot,
             logs,
-            map: self.map,
-            map_file: self.map_file,
+            reading: Reading {
+                map: self.map,
+                map_file: self.map_file,
+                xacro_args: self.xacro_args,
+                lock: self.lock,
+            },
             topic: self.topic,
             episodes: self.episodes,
             calibration: self.calibration,
-            xacro_args: self.xacro_args,
-            lock: self.lock,
             allow_truncated: self.allow_truncated,
             skip_bad_logs: self.skip_bad_logs,
             as_logged: self.as_logged,

@@ -1,5 +1,5 @@
 //! The C file compiled by the C compiler of this machine, held to our own plant; said to be skipped where there is none.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
 use gapscope_diagnosis::{Corrected, EncoderSide, MODEL_SCHEMA};
 use gapscope_dynamics::{Loaded, Model, StepModel, robots};

@@ -1,5 +1,5 @@
-//! The diagnosis and the evaluation as a few lines for the terminal, within its width: the answer in three sentences, then
-//! what could make it wrong, then the figures.
+//! The diagnosis and the evaluation as a few lines for the terminal, within its width: faults of the data, the answer in three
+//! sentences, what it cannot be told from, then the figures.
 
 mod change;
 
@@ -40,10 +40,27 @@ fn told(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
     lines
 }
 
-/// The diagnosis in some 25 lines: the answer, faults and ties, which, where, how far, notes, and where the report is.
+/// What is wrong with the data, and what may be.
+fn faults(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
+    let (data, mut lines) = (&diagnosis.data, Vec::new());
+    for fault in &data.faults {
+        block(&mut lines, paint, "Fault", &[clean(&fault_line(fault))]);
+    }
+    for doubt in &data.doubts {
+        block(&mut lines, paint, "In doubt", &[clean(&capital(&doubt.question))]);
+    }
+    if !lines.is_empty() {
+        lines.push(String::new());
+    }
+    lines
+}
+
+/// The diagnosis in some 25 lines: faults, the answer, ties, which, where, how far, notes, and where the report is.
 pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> String {
     let data = &diagnosis.data;
-    let mut lines = told(diagnosis, paint);
+    // An answer of wrong logs is none: what is wrong with them comes before it.
+    let mut lines = faults(diagnosis, paint);
+    lines.extend(told(diagnosis, paint));
     lines.push(String::new());
     let of = format!(
         "{} · {}, {}, {} at {}",
@@ -54,12 +71,6 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
         with_unit(&rounded(data.rate), "Hz")
     );
     lines.extend(wrap(&clean(&of), paint.width));
-    for fault in &data.faults {
-        block(&mut lines, paint, "Fault", &[clean(&fault_line(fault))]);
-    }
-    for doubt in &data.doubts {
-        block(&mut lines, paint, "In doubt", &[clean(&capital(&doubt.question))]);
-    }
     block(&mut lines, paint, "Ties", &ties(diagnosis));
     let label = verdict(diagnosis.verdict).to_uppercase();
     let mended = data.faults.iter().any(|fault| fault.mended);

@@ -58,12 +58,7 @@ impl Given<'_> {
         Ok(Input {
             robot: self.robot,
             logs,
-            reading: Reading {
-                map: self.map,
-                map_file: self.map_file,
-                xacro_args: self.xacro_args,
-                lock: self.lock,
-            },
+            reading: Reading { map: self.map, map_file: self.map_file, xacro_args: self.xacro_args, lock: self.lock },
             topic: self.topic,
             episodes: self.episodes,
             calibration: self.calibration,

@@ -131,9 +131,9 @@ fn header(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Mark
                         @if !setting.made.is_empty() { " · " (setting.made) }
                     }
                     h1 class=(tone(diagnosis.verdict)) { (words::verdict(diagnosis.verdict)) }
-                    div.said { @for line in plain::answer(diagnosis) { p { (line) } } }
                     @for fault in &data.faults { p.fault role="alert" { b { "Fault of the data. " } (ticked(&crate::input::fault_line(fault))) } }
                     @for doubt in &data.doubts { p.fault { b { "In doubt. " } (ticked(&doubt.question)) } }
+                    div.said { @for line in plain::answer(diagnosis) { p { (line) } } }
                 }
                 (skeleton::render(diagnosis, evidence, setting.scene.as_ref()))
             }

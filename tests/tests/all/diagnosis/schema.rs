@@ -38,7 +38,7 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
             "shrink",
             "next_experiment",
         ],
-        &["power", "why"],
+        &["power", "why", "covariance"],
     );
     assert_eq!((&json["schema"], &json["robot"]), (&"gapscope.diagnosis/1".into(), &"arm6".into()));
     assert_eq!(json["verdict"], "explained");

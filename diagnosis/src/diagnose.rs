@@ -2,7 +2,6 @@
 
 use crate::band::Band;
 use crate::climb::{self, LATE, Rival};
-use crate::contact::{self, Left};
 use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
 use crate::covariance::covariance;
 use crate::estimate::{Fit, speeds};
@@ -14,7 +13,7 @@ use crate::horizon::{self, Errors};
 use crate::learner;
 use crate::noise::PART_OF_NOISE;
 use crate::power;
-use crate::problem::{Entry, Known, Problem, Term};
+use crate::problem::{Known, Problem};
 use crate::refine::Data;
 use crate::regimes::regimes;
 use crate::schema::*;
@@ -23,7 +22,7 @@ use crate::signals::{Signals, standstill};
 use crate::verdict::{self, Judged};
 use gapscope_datasets::{Episode, Trajectory};
 use gapscope_dynamics::{Joint, Model};
-use gapscope_effects::{Candidate, Effect, EffectError, EncoderSide, Kind, Motion, Plant};
+use gapscope_effects::{Candidate, Effect, EffectError, EncoderSide, Kind, Plant};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -35,18 +34,6 @@ const TIE: f64 = 3.0;
 const MOVING_PART: f64 = 0.05;
 /// ... and its top speed is this many times the speed that counts as standing.
 const MOVING_SPEED: f64 = 8.0;
-/// Kinds that are taken into account while looking for something outside that pushes.
-const COMMON: [Kind; 7] = [
-    Kind::ViscousFriction,
-    Kind::CoulombFriction,
-    Kind::Armature,
-    Kind::TorqueBias,
-    Kind::GravityMisalignment,
-    Kind::Payload,
-    Kind::LinkInertiaError,
-];
-/// Times, at most, that what pushes and what the robot lacks are told apart, each beside the other.
-const LOOKS: usize = 3;
 /// Time about a push that counts neither way, s.
 const EDGE: f64 = 0.15;
 /// Power of the explained part of the gap by which confidence falls: what leaves much of the gap may be the nearest thing
@@ -188,84 +175,6 @@ struct HeldOut {
 }
 
 impl Logs<'_> {
-    /// Marks the stretches of time that stand out of what the commonest candidates leave.
-    fn look_for_pushes(&mut self) -> Result<(), EffectError> {
-        let n = self.model.dof();
-        let nominal: Vec<Vec<Vec<f64>>> = self
-            .signals
-            .par_iter()
-            .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
-            .collect();
-        let noise = noise_floor(&self.signals, &self.band, &nominal, n);
-        let bare = gap::at_rows(&self.band, &nominal, n);
-        let mut pushed =
-            contact::stretches(&self.signals, &self.band, &Left { noise: contact::noise(&bare), rest: bare });
-        if pushed.iter().all(Vec::is_empty) {
-            let (left, _) = self.left_beside_pushes(&noise);
-            pushed = contact::stretches(&self.signals, &self.band, &left);
-        }
-        // What pushes and what the robot itself lacks are told apart by turns: both stand out of a nominal model.
-        for look in 0..=LOOKS {
-            let none = pushed.iter().all(Vec::is_empty);
-            let as_before = self.signals.iter().map(|s| &s.pushed).eq(&pushed);
-            self.signals.iter_mut().zip(pushed).for_each(|(s, pushed)| s.pushed = pushed);
-            if none || as_before || look == LOOKS {
-                break;
-            }
-            let (left, always) = self.left_beside_pushes(&noise);
-            pushed = contact::of_one_force(&self.signals, &self.band, &left, &always);
-        }
-        Ok(())
-    }
-
-    /// What the commonest candidates leave of the logs beside the pushes known so far, these left in it, and the torque of
-    /// the force that these show if it were always there.
-    fn left_beside_pushes(&self, noise: &[f64]) -> (Left, Rows) {
-        let kinds = [&COMMON[..], &[Kind::ExternalContact]].concat();
-        let mut candidates = Candidate::all(self.model);
-        candidates.retain(|c| COMMON.contains(&c.kind));
-        if self.signals.iter().any(|s| !s.pushed.is_empty()) {
-            candidates.extend(Candidate::contacts(self.model));
-        }
-        let terms = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
-        let problem = self.data(noise).problem(terms, &kinds);
-        let theta = problem.robust();
-        let n = self.model.dof();
-        let of_kind = |e: &&Entry, kind: Kind| e.candidate.kind == kind;
-        let mut holds = vec![0.0; n];
-        for e in problem.entries.iter().filter(|e| of_kind(e, Kind::CoulombFriction)) {
-            e.candidate.joints.iter().for_each(|&j| holds[j] += theta[e.columns.start].abs());
-        }
-        let torque = |s: &Signals, keep: &dyn Fn(&&Entry) -> bool| {
-            let motion = Motion { pushed: &[[f64::NEG_INFINITY, f64::INFINITY]], ..s.motion(self.model, &self.still) };
-            let mut torque = vec![vec![0.0; s.len()]; n];
-            for e in problem.entries.iter().filter(keep) {
-                for (column, theta) in e.candidate.columns(&motion).iter().zip(&theta[e.columns.clone()]) {
-                    for (j, row) in &column.rows {
-                        torque[*j].iter_mut().zip(row).for_each(|(torque, x)| *torque += theta * x);
-                    }
-                }
-            }
-            torque
-        };
-        let rest = |s: &Signals| -> Vec<Vec<f64>> {
-            let own = torque(s, &|e| !of_kind(e, Kind::ExternalContact));
-            let left =
-                |j: usize| s.tau[j].iter().zip(&s.nominal[j]).zip(&own[j]).map(|((t, n), o)| t - n - o).collect();
-            (0..n).map(left).collect()
-        };
-        let still = |s: &Signals| -> Vec<Vec<f64>> {
-            let rests = |j: usize| s.v[j].iter().map(|v| f64::from(u8::from(v.abs() < self.still[j]))).collect();
-            (0..n).map(rests).collect()
-        };
-        let at_rows = |of: &dyn Fn(&Signals) -> Vec<Vec<f64>>| {
-            gap::at_rows(&self.band, &self.signals.iter().map(of).collect::<Vec<_>>(), n)
-        };
-        let (rest, still) = (at_rows(&rest), at_rows(&still));
-        let always = at_rows(&|s| torque(s, &|e| of_kind(e, Kind::ExternalContact)));
-        (Left::new(rest, &still, &holds), always)
-    }
-
     fn is_excited(&self) -> bool {
         self.moving.iter().any(|m| *m) && self.band.rows.len() >= verdict::LEAST_ROWS
     }

@@ -31,6 +31,7 @@ mod limits;
 mod noise;
 mod power;
 mod problem;
+mod pushes;
 mod refine;
 mod regimes;
 mod rollout;

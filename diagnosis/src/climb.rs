@@ -24,6 +24,8 @@ const SHORTLIST: usize = 6;
 const WEIGHINGS: usize = 3;
 /// Part of a joint's effort by which a kind beyond calibration must move it, beside all that the others could do instead.
 const MATERIAL: f64 = 0.003;
+/// Nats that the logs lose where something is missed: what comes in its place must explain as much.
+const MISSED: f64 = 20.0;
 /// Rise of the score that is worth a move, nats.
 const RISE: f64 = 0.01;
 
@@ -48,6 +50,12 @@ pub struct Rival {
 }
 
 impl Rival {
+    /// Kinds of the catalogue of which it has candidates that were not chosen.
+    pub fn instead(&self, problem: &Problem, chosen: &Choice) -> Vec<Kind> {
+        let came: Vec<usize> = self.choice.set.iter().copied().filter(|c| !chosen.set.contains(c)).collect();
+        kinds(problem, &came).into_iter().filter(|kind| *kind != self.without && !kind.is_outside()).collect()
+    }
+
     /// Probability of the rival, if one of the two is right.
     pub fn probability(&self) -> f64 {
         1.0 / (1.0 + self.odds.exp())
@@ -118,12 +126,31 @@ pub fn rivals(problem: &Problem, chosen: &Choice) -> Vec<Rival> {
             let rest: Vec<usize> = chosen.set.iter().copied().filter(|c| kind(c) != without).collect();
             // A delay and a lag are told apart by other means.
             let family: &[Kind] = if LATE.contains(&without) { &LATE } else { &[without] };
-            let rival = competition.climb(rest, family)?;
-            let odds = best.nats - rival.nats;
-            let by_logs = odds - competition.prior(&best.set) + competition.prior(&rival.set);
-            Some(Rival { without, choice: Choice { set: rival.set }, odds, by_logs })
+            Some(competition.rival(without, &best, competition.climb(rest, family)?))
         })
         .collect()
+}
+
+/// The likeliest account with a candidate of another kind in the place of some that were chosen, the two held against each
+/// other by what they leave alone; `None` where the logs miss nothing in that place.
+pub fn swap(problem: &Problem, chosen: &Choice, gone: &[usize]) -> Option<Rival> {
+    let competition = Competition::new(problem);
+    let without = competition.kind(*gone.first()?);
+    let best = competition.account(chosen.set.clone(), &problem.score())?;
+    let base = competition.without(&chosen.set, |c| gone.contains(&c));
+    let solve = |set: &[usize]| best.score.solve(&problem.columns(set));
+    let (own, missing) = (solve(&best.set)?, solve(&base)?);
+    if own.likeliest() - missing.likeliest() < MISSED {
+        return None;
+    }
+    let other = |c: usize| competition.kind(c) != without && !competition.kind(c).is_outside();
+    let additions = competition.additions(&best.score, &base, &missing, &problem.closed, &other);
+    let left = |set: &[usize]| solve(set).map_or(f64::NEG_INFINITY, |solved| solved.likeliest());
+    let (nats, set) =
+        (additions.into_iter().take(SHORTLIST)).map(|(_, set)| (left(&set), set)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let by_logs = own.likeliest() - nats;
+    let rival = competition.account(set, &best.score)?;
+    Some(Rival { by_logs, ..competition.rival(without, &best, rival) })
 }
 
 impl<'a> Competition<'a> {
@@ -222,12 +249,10 @@ impl<'a> Competition<'a> {
         let mut wide = false;
         for _ in 0..MOVES {
             let next = if wide { self.far(&here, forbidden) } else { self.near(&here, forbidden) };
-            // A move may lose at its own noise what it gains at this one, or come to nothing there: then the next one.
+            // At its own noise a move may lose what it gains at this one, and gain what it does not: where something large is
+            // missed, the noise of its joint is what is missed.
             let rises = |nats: f64| nats > here.nats + RISE;
-            let better = next
-                .into_iter()
-                .take_while(|(nats, _)| rises(*nats))
-                .take(SHORTLIST)
+            let better = (next.into_iter().take(SHORTLIST))
                 .find_map(|(_, set)| self.account(set, &here.score).filter(|account| rises(account.nats)));
             match better {
                 Some(better) => {
@@ -239,6 +264,12 @@ impl<'a> Competition<'a> {
             }
         }
         Some(here)
+    }
+
+    fn rival(&self, without: Kind, best: &Account<'_>, rival: Account<'_>) -> Rival {
+        let odds = best.nats - rival.nats;
+        let by_logs = odds - self.prior(&best.set) + self.prior(&rival.set);
+        Rival { without, choice: Choice { set: rival.set }, odds, by_logs }
     }
 
     /// A set with one candidate more, those that it excludes less.
@@ -268,7 +299,6 @@ impl<'a> Competition<'a> {
             })
             .collect();
         moves.extend(self.additions(score, &here.set, &solved, forbidden, &|_| true));
-        moves.retain(|(nats, _)| *nats > here.nats);
         moves.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
         moves.truncate(SHORTLIST);
         self.ranked(score, moves.into_iter().map(|(_, set)| set).collect())

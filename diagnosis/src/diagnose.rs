@@ -19,6 +19,7 @@ use crate::regimes::regimes;
 use crate::schema::*;
 use crate::search::Chosen;
 use crate::signals::{Signals, standstill};
+use crate::structure;
 use crate::verdict::{self, Judged};
 use gapscope_datasets::{Episode, Trajectory};
 use gapscope_dynamics::{Joint, Model};
@@ -286,6 +287,16 @@ impl Logs<'_> {
         })
     }
 
+    /// What is left of a joint at the rows at which it slides.
+    fn sliding(&self, joint: usize, rows: &[f64]) -> Vec<f64> {
+        let slides = |(e, s): (usize, &Signals)| {
+            let slides = s.slides(joint, self.still[joint]);
+            let at_rows = self.band.filter_where(e, &slides, &vec![0.0; s.len()]);
+            self.band.of_episode[e].clone().zip(at_rows).filter_map(|(row, slides)| slides.map(|_| rows[row]))
+        };
+        self.signals.iter().enumerate().flat_map(slides).collect()
+    }
+
     fn nominal(&self) -> HeldOut {
         HeldOut {
             rows: self.nominal_rows(),
@@ -318,7 +329,14 @@ impl Logs<'_> {
         let before = self.nominal();
         let after = self.held_out(problem, &fit.set)?;
         let final_residuals = self.data(&chosen.noise).rest(problem, fit)?;
-        let floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof());
+        progress("networks", 0.8);
+        let learned = learner::learn(&self.signals, &self.band, &weights, &before.rows, &after.rows);
+        let mut floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof());
+        for (j, floor) in floor.iter_mut().enumerate() {
+            let noise =
+                learned.as_ref().and_then(|l| structure::noise(&self.sliding(j, &after.rows[j]), l.predicted[j]));
+            *floor = floor.max(noise.unwrap_or(0.0));
+        }
         progress("intervals", 0.85);
         let everything = |_: usize| true;
         let squares = |rows: &Rows| gap::squares(&self.band, rows, everything);
@@ -326,9 +344,7 @@ impl Logs<'_> {
         let change = |after: &Rows| gap::change(&squares(&before.rows), &squares(after), &weights, floor_rms);
         let torque = change(&after.rows);
         let (one_step, rollout) = before.errors.change(&after.errors, &weights);
-        progress("networks", 0.95);
-        let learned = learner::learn(&self.signals, &self.band, &weights, &before.rows, &after.rows);
-        let learnable = learned.map_or(0.0, |l| l.learnable(floor_rms));
+        let learnable = learned.as_ref().map_or(0.0, |l| l.learnable(floor_rms));
         // No hand pushes twice alike: what is left while nothing pushes is what a verdict hangs on.
         let untouched = |i: usize| {
             let row = &self.band.rows[i];
@@ -414,8 +430,8 @@ impl Logs<'_> {
                 rollout,
                 reference: Reference {
                     noise_floor: floor_rms,
-                    residual_network: learned.map(|l| l.residual_network),
-                    pure_network: learned.map(|l| l.pure_network),
+                    residual_network: learned.as_ref().map(|l| l.residual_network),
+                    pure_network: learned.as_ref().map(|l| l.pure_network),
                 },
             },
         };
@@ -431,7 +447,6 @@ impl Logs<'_> {
         change: impl Fn(&Rows) -> Change,
     ) -> Result<(Vec<FoundEffect>, Option<Covariance>), EffectError> {
         let (problem, fit) = (&chosen.exact, &chosen.fit);
-        let kinds = climb::kinds(problem, &fit.set);
         let speeds = speeds(&self.signals, &self.band, self.model.dof());
         let (mut found, mut told) = (Vec::new(), Vec::new());
         for (effect, own) in fit.effects_with_candidates(problem, self.model) {
@@ -448,20 +463,17 @@ impl Logs<'_> {
                 Some(turned) => turned.odds,
                 None => exact.or(rival.map(|r| r.odds)).unwrap_or(f64::INFINITY),
             };
+            // What could take the place of this one alone.
+            let gone: Vec<usize> = own.iter().map(|&c| chosen.choice.set[c]).collect();
+            let swap = if gone.len() == 1 { climb::swap(&chosen.all, &chosen.choice, &gone) } else { None };
+            let others: Vec<&Rival> = rival.into_iter().chain(&swap).filter(|_| turned.is_none()).collect();
             // What could be another is no surer than that it is not.
-            let tied = rival.map(|r| r.odds).filter(|odds| turned.is_none() && *odds < TIE);
-            let odds = tied.map_or(odds, |tied| odds.min(tied.max(0.0)));
+            let tied = others.iter().map(|r| r.odds).filter(|odds| *odds < TIE);
+            let odds = tied.fold(odds, |odds, tied| odds.min(tied.max(0.0)));
             let doubt = late.unwrap_or(0.0).max(1.0 / (1.0 + odds.exp()));
-            let mut confused = rival
-                .filter(|_| turned.is_none() && late.is_none())
-                .filter(|r| r.odds.min(r.by_logs) < TIE)
-                .map_or_else(Vec::new, |r| {
-                    climb::kinds(&chosen.all, &r.choice.set)
-                        .into_iter()
-                        .filter(|k| !kinds.contains(k) && !k.is_outside())
-                        .map(|k| k.name().to_owned())
-                        .collect()
-                });
+            let near = others.iter().filter(|r| late.is_none() && r.odds.min(r.by_logs) < TIE);
+            let mut confused: Vec<String> =
+                near.flat_map(|r| r.instead(&chosen.all, &chosen.choice)).map(|kind| kind.name().to_owned()).collect();
             if late.is_some_and(|doubt| doubt > (-TIE).exp()) {
                 confused.extend(LATE.iter().filter(|other| **other != kind).map(|k| k.name().to_owned()));
             }

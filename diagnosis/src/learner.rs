@@ -16,7 +16,7 @@ const BLOCK: usize = 12;
 const FOLDS: usize = 8;
 
 /// What networks leave of the torque, held out, in the measure of the overall torque figures.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
     /// One on top of the nominal model, on folds that it did not see.
     pub residual_network: f64,
@@ -24,6 +24,9 @@ pub struct Learned {
     pub pure_network: f64,
     /// What the corrected model leaves, and what one on top of it leaves of that, on blocks that it did not see.
     pub corrected: [f64; 2],
+    /// Part of the square that the corrected model leaves of each joint which one on top of it predicts; under 0 where it
+    /// only adds its own noise.
+    pub predicted: Vec<f64>,
 }
 
 impl Learned {
@@ -73,7 +76,14 @@ pub fn learn(signals: &[Signals], band: &Band, weights: &[f64], before: &Rows, a
     let trains: Vec<bool> = (0..used.len()).map(|i| i % BLOCK != 0 && (i + 1) % BLOCK != 0).collect();
     let found = explained_share(&features, &rest, &folds, Some(&trains), None).ok()?;
     let left: Vec<f64> = rest.iter().zip(&found.prediction).map(|(target, found)| target - found).collect();
+    let mut predicted = vec![0.0; n];
+    for (place, &j) in moving.iter().enumerate() {
+        let of = |rows: &[f64]| rms(&rows.iter().skip(place).step_by(moving.len()).copied().collect::<Vec<_>>());
+        let whole = of(&rest);
+        predicted[j] = if whole > 0.0 { 1.0 - (of(&left) / whole).powi(2) } else { 0.0 };
+    }
     Some(Learned {
+        predicted,
         residual_network: rms(&residual.concat()),
         pure_network: rms(&pure.concat()),
         corrected: [rms(&rest), rms(&left)],
@@ -121,6 +131,8 @@ mod tests {
         assert!((found.corrected[1] / found.corrected[0] - 1.0).abs() < 0.02, "noise cannot be predicted: {found:?}");
         let other = ask(&noise, &gap);
         assert!(other.learnable(1.0) > 0.8, "{other:?}");
+        assert!(other.predicted.iter().all(|part| *part > 0.8), "{other:?}");
+        assert!(found.predicted.iter().all(|part| part.abs() < 0.03), "{found:?}");
         assert!(other.residual_network > 0.99 * found.corrected[0], "{other:?}");
         // Across whole motions, which the references are held out by, four short logs teach little of it.
         assert!(found.residual_network < 0.95 * other.corrected[0], "{found:?} {other:?}");
@@ -131,7 +143,8 @@ mod tests {
 
     #[test]
     fn nothing_above_the_floor_is_nothing_to_learn() {
-        let learned = Learned { residual_network: 1.0, pure_network: 1.0, corrected: [1.0, 0.5] };
+        let learned =
+            Learned { residual_network: 1.0, pure_network: 1.0, corrected: [1.0, 0.5], predicted: Vec::new() };
         assert_eq!((learned.learnable(1.1), learned.learnable(1.0)), (0.0, 0.0));
         assert!((learned.learnable(0.0) - 0.75).abs() < 1e-12);
     }

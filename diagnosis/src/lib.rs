@@ -39,6 +39,7 @@ pub mod schema;
 mod screen;
 mod search;
 mod signals;
+mod structure;
 #[cfg(test)]
 mod support;
 mod verdict;

@@ -105,6 +105,17 @@ impl Logs<'_> {
     }
 }
 
+/// Rows in each band of frequencies, and the part of all frequencies that it has. Together they are the rows.
+pub(crate) fn in_bands(band: &Band, rows: &[f64]) -> Vec<(Vec<f64>, f64)> {
+    (0..BANDS)
+        .map(|own| {
+            let mut part = rows.to_vec();
+            in_frequency(band, &mut part, |of| f64::from(u8::from(of == own)));
+            (part, (EDGES[own + 1] - EDGES[own]) / EDGES[BANDS])
+        })
+        .collect()
+}
+
 /// Multiplies each band of frequencies of each episode of some rows by a factor.
 fn in_frequency(band: &Band, rows: &mut [f64], factor: impl Fn(usize) -> f64) {
     let mut planner = FftPlanner::new();
@@ -169,6 +180,26 @@ mod tests {
             equalizer.apply(&band, 0, &mut rows);
             assert_eq!(rows, wave);
         }
+    }
+
+    #[test]
+    fn bands_of_frequencies_together_are_the_rows_and_each_has_its_own() {
+        let band = fitted(Kind::ViscousFriction, torque(|v| v)).1;
+        let mut rows = vec![0.0; band.rows.len()];
+        for (e, at) in band.of_episode.iter().enumerate() {
+            for (i, row) in at.clone().enumerate() {
+                let turns = i as f64 * band.spacing()[e] * band.cutoff;
+                rows[row] = (TAU * 0.02 * turns).sin() + 0.1 * (TAU * 0.6 * turns).sin();
+            }
+        }
+        let parts = in_bands(&band, &rows);
+        assert!((parts.iter().map(|(_, width)| width).sum::<f64>() - 1.0).abs() < 1e-12);
+        for (i, row) in rows.iter().enumerate() {
+            assert!((parts.iter().map(|(part, _)| part[i]).sum::<f64>() - row).abs() < 1e-9);
+        }
+        let of = |own: usize| parts[own].0.iter().map(|x| x * x).sum::<f64>();
+        let all = rows.iter().map(|x| x * x).sum::<f64>();
+        assert!(of(0) > 0.9 * all && of(7) > 0.008 * all && of(4) < 0.001 * all);
     }
 
     #[test]

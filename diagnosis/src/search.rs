@@ -70,11 +70,10 @@ impl Chosen {
             (self.filters_beyond(other) || other.filters_beyond(self)) && logs.noisier.len() == logs.signals.len();
         let equalizers = filtered.then(|| logs.at_one_noise([(self, &own), (other, &others)])).transpose()?;
         let at = |i: usize| equalizers.as_ref().map(|both| &both[i]);
-        let correlation = |of: &Chosen, i: usize| of.exact.correlation_of(&of.fit, at(i), &logs.band);
-        // What is left of the better account is nearer to noise: it says how many rows count as one.
+        // What is left of the better account is nearer to noise: it says how many rows of a rest count as one.
         let counts: Vec<f64> =
-            correlation(self, 0).into_iter().zip(correlation(other, 1)).map(|(a, b)| a.min(b)).collect();
-        let evidence = |of: &Chosen, i: usize| of.exact.evidence(&of.fit, at(i), &counts, &logs.band);
+            self.exact.correlation().iter().zip(other.exact.correlation()).map(|(a, b)| a.min(*b)).collect();
+        let evidence = |of: &Chosen, i: usize| of.exact.evidence(&of.fit, at(i), &logs.band);
         let (mut evidence, mut others_evidence) = (evidence(self, 0), evidence(other, 1));
         let least: Vec<f64> =
             evidence.noise.iter().zip(&others_evidence.noise).map(|(own, other)| own.min(*other)).collect();

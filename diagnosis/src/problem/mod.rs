@@ -10,7 +10,7 @@ mod terms;
 mod weigh;
 
 use crate::band::Band;
-use crate::noise::Equalizer;
+use crate::noise::{self, Equalizer};
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Body, Candidate, Column, EncoderSide, Kind};
@@ -341,13 +341,21 @@ impl JointRows {
         (0..self.rows.len()).map(|i| used.iter().map(|&(at, t)| self.values[i * m + at] * t).sum()).collect()
     }
 
-    /// What is left of the rows at the noise that an equaliser brings it to.
-    fn at_noise(&self, band: &Band, joint: usize, rest: Vec<f64>, equalizer: Option<&Equalizer>) -> Vec<f64> {
-        let Some(equalizer) = equalizer else { return rest };
+    /// What is left of the rows in each band of frequencies, at the noise that an equaliser brings it to.
+    fn in_bands(
+        &self,
+        band: &Band,
+        joint: usize,
+        rest: Vec<f64>,
+        equalizer: Option<&Equalizer>,
+    ) -> Vec<(Vec<f64>, f64)> {
         let mut all = vec![0.0; band.rows.len()];
         self.rows.iter().zip(rest).for_each(|(&row, rest)| all[row] = rest);
-        equalizer.apply(band, joint, &mut all);
-        self.rows.iter().map(|&row| all[row]).collect()
+        if let Some(equalizer) = equalizer {
+            equalizer.apply(band, joint, &mut all);
+        }
+        let own = |part: &Vec<f64>| self.rows.iter().map(|&row| part[row]).collect();
+        noise::in_bands(band, &all).iter().map(|(part, width)| (own(part), *width)).collect()
     }
 
     fn residual(&self, columns: &[usize], theta: &[f64]) -> Vec<f64> {

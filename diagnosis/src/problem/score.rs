@@ -7,9 +7,9 @@
 //!
 //! ln p = −½ Σ ν_j ln v_j − ½ (Σ s_j / (ρ_j v_j) − bᵀA⁻¹b) − ½ ln|A| − ½ ln|P|,    ν_j = n_j / ρ_j.
 
+use super::Problem;
 use super::factor::Factor;
-use super::weigh::{INEXACT, correlation_time};
-use super::{JointRows, Problem};
+use super::weigh::INEXACT;
 use crate::band::Band;
 use crate::estimate::Fit;
 use crate::noise::Equalizer;
@@ -52,8 +52,10 @@ pub struct Evidence {
     pub seen: Vec<f64>,
     /// ... by a fit to the other folds, ...
     pub held_out: Vec<f64>,
-    /// ... and what the coefficients cost.
+    /// ... what the coefficients cost, ...
     pub occam: f64,
+    /// ... and of that, how far from the URDF those lie of which a card says how far they may.
+    pub far: f64,
     /// Variance of what is left of each joint, (N m)² or N².
     pub noise: Vec<f64>,
 }
@@ -74,13 +76,14 @@ impl Evidence {
     }
 
     /// By how many nats this account is likelier than another. The evidence of one fit and that of what is held out must agree,
-    /// and the lesser counts. No account is exact: where blocks of time vote against each other, a majority is no more than
+    /// and the lesser counts; how far bodies lie from the URDF belongs to both, as the same is predicted by a payload and by a
+    /// last link that is off by as much. No account is exact: where blocks of time vote against each other, a majority is no more than
     /// one (Vuong, Econometrica 57(2) 1989), their spread told by those that vote against.
     pub fn against(&self, other: &Evidence) -> f64 {
         let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).sum::<f64>();
         let seen = sum(&self.seen, &other.seen) + self.occam - other.occam;
         let votes = || self.held_out.iter().zip(&other.held_out).map(|(a, b)| a - b);
-        let held_out = votes().sum::<f64>();
+        let held_out = votes().sum::<f64>() + self.far - other.far;
         if seen * held_out <= 0.0 {
             return 0.0;
         }
@@ -130,6 +133,11 @@ fn heavy_tailed(rest: &[f64], own: &[f64], least: f64) -> (f64, Vec<f64>) {
 }
 
 impl Solved {
+    /// Log probability of the logs and the coefficients found, nats, whatever more of them would have been possible.
+    pub fn likeliest(&self) -> f64 {
+        self.nats - self.occam
+    }
+
     /// Columns whose coefficients came to nothing at a bound.
     pub fn at_nothing(&self) -> impl Iterator<Item = usize> {
         self.held.iter().filter(|(_, theta)| *theta == 0.0).map(|(c, _)| *c)
@@ -156,46 +164,52 @@ impl Problem {
         empty.at(noise)
     }
 
-    /// What is left of a joint's rows by a fit, outliers cut, at the noise that an equaliser brings it to: rows of it that
-    /// count as one.
-    pub fn correlation_of(&self, fit: &Fit, equalizer: Option<&Equalizer>, band: &Band) -> Vec<f64> {
-        if equalizer.is_none() {
-            return self.correlation.clone();
-        }
-        let of = |(j, joint): (usize, &JointRows)| {
-            let rest = joint.at_noise(band, j, joint.residual(&fit.columns, &fit.theta), equalizer);
-            correlation_time(&rest.iter().zip(&joint.robust).map(|(rest, weight)| rest * weight).collect::<Vec<_>>())
-        };
-        self.joints.iter().enumerate().map(of).collect()
+    /// Rows of each joint that count as one.
+    pub fn correlation(&self) -> &[f64] {
+        &self.correlation
     }
 
     /// What logs say for an account at its exact law, as good as the whole problem is linear about it (Laplace). What is left
-    /// has heavy tails, so that neither a glitch nor a blow decides, and of every `correlation[j]` rows of joint j one counts.
-    pub fn evidence(&self, fit: &Fit, equalizer: Option<&Equalizer>, correlation: &[f64], band: &Band) -> Evidence {
+    /// has heavy tails, so that neither a glitch nor a blow decides, and a level of its own in each band of frequencies
+    /// (Whittle, Arkiv för Matematik 2(23) 1953): noise at some of them does not drown what the others say.
+    pub fn evidence(&self, fit: &Fit, equalizer: Option<&Equalizer>, band: &Band) -> Evidence {
         let folds = Fit::without_folds(self, &fit.set);
         let blocks = vec![0.0; band.blocks];
         let noise = vec![1.0; self.joints.len()];
-        let mut evidence = Evidence { seen: blocks.clone(), held_out: blocks, occam: 0.0, noise };
+        let mut evidence = Evidence { seen: blocks.clone(), held_out: blocks, occam: 0.0, far: 0.0, noise };
         for (j, joint) in self.joints.iter().enumerate().filter(|(_, joint)| !joint.rows.is_empty()) {
             let inexact: Vec<f64> = joint.linear_target.iter().map(|x| (INEXACT * x).powi(2)).collect();
+            let least = self.least_noise(j);
+            let nats = |rest: Vec<f64>| -> Vec<f64> {
+                let mut nats = vec![0.0; rest.len()];
+                for (part, width) in joint.in_bands(band, j, rest, equalizer) {
+                    let inexact: Vec<f64> = inexact.iter().map(|x| x * width).collect();
+                    let (_, own) = heavy_tailed(&part, &inexact, least * width);
+                    // So many of the rows of a band are independent.
+                    nats.iter_mut().zip(own).for_each(|(nats, own)| *nats += own * width);
+                }
+                nats
+            };
             let block = |row: &usize| band.rows[*row].block;
             let rest = joint.residual(&fit.columns, &fit.theta);
-            evidence.noise[j] = heavy_tailed(&rest, &inexact, self.least_noise(j)).0;
-            let (_, nats) = heavy_tailed(&joint.at_noise(band, j, rest, equalizer), &inexact, self.least_noise(j));
-            for (row, nats) in joint.rows.iter().zip(nats) {
-                evidence.seen[block(row)] += nats / correlation[j];
+            evidence.noise[j] = heavy_tailed(&rest, &inexact, least).0;
+            for (row, nats) in joint.rows.iter().zip(nats(rest)) {
+                evidence.seen[block(row)] += nats;
             }
             let rests: Vec<Vec<f64>> = folds.iter().map(|fit| joint.residual(&fit.columns, &fit.theta)).collect();
             let rest: Vec<f64> = joint.rows.iter().enumerate().map(|(i, &r)| rests[band.rows[r].fold][i]).collect();
-            let (_, nats) = heavy_tailed(&joint.at_noise(band, j, rest, equalizer), &inexact, self.least_noise(j));
-            for (row, nats) in joint.rows.iter().zip(nats) {
-                evidence.held_out[block(row)] += nats / correlation[j];
+            for (row, nats) in joint.rows.iter().zip(nats(rest)) {
+                evidence.held_out[block(row)] += nats;
             }
         }
         let score = self.score().at(evidence.noise.clone());
         // The coefficients are those of the fit, which knows more bounds than each its own.
-        let size: f64 = fit.columns.iter().zip(&fit.theta).map(|(&c, t)| (t / score.spread[c]).powi(2)).sum();
-        evidence.occam = score.solve(&fit.columns).map_or(f64::NEG_INFINITY, |solved| solved.occam - 0.5 * size);
+        let far = |of: &dyn Fn(usize) -> bool| -> f64 {
+            let own = fit.columns.iter().zip(&fit.theta).filter(|(c, _)| of(**c));
+            -0.5 * own.map(|(&c, t)| (t / score.spread[c]).powi(2)).sum::<f64>()
+        };
+        evidence.occam = score.solve(&fit.columns).map_or(f64::NEG_INFINITY, |solved| solved.occam + far(&|_| true));
+        evidence.far = far(&|c| self.prior[c] > 0.0);
         evidence
     }
 
@@ -448,6 +462,7 @@ mod tests {
             seen: seen.to_vec(),
             held_out: held_out.to_vec(),
             occam: 0.0,
+            far: 0.0,
             noise: Vec::new(),
         };
         let (first, second) = (account(&seen, &held_out), account(&[0.0; 20], &[0.0; 20]));
@@ -471,12 +486,30 @@ mod tests {
     }
 
     #[test]
+    fn of_two_accounts_that_predict_the_same_the_one_is_likelier_whose_bodies_are_nearer_to_the_urdf() {
+        let account = |occam: f64, far: f64| Evidence {
+            seen: vec![0.0; 20],
+            held_out: vec![0.0; 20],
+            occam,
+            far,
+            noise: Vec::new(),
+        };
+        // A last link twice as heavy, and a payload that costs ten coefficients and leaves the link as it is.
+        let (link, payload) = (account(-150.0, -120.0), account(-60.0, -5.0));
+        assert!((payload.against(&link) - 90.0).abs() < 1e-12, "the lesser of what is seen and what is known");
+        // A link that is off by a little costs less than the coefficients of a payload.
+        let (link, payload) = (account(-32.0, -2.0), account(-60.0, 0.0));
+        assert!(payload.against(&link) <= 0.0);
+    }
+
+    #[test]
     fn a_rest_counts_by_what_it_bears_beyond_friction_and_noise() {
         let at = |borne: f64| {
             let signals = crate::support::fitted(gapscope_effects::Kind::CoulombFriction, |_| {}).0;
             let band = Band::new(&signals);
             let blocks = vec![0.0; band.blocks];
-            let mut evidence = Evidence { seen: blocks.clone(), held_out: blocks, occam: 0.0, noise: Vec::new() };
+            let mut evidence =
+                Evidence { seen: blocks.clone(), held_out: blocks, occam: 0.0, far: 0.0, noise: Vec::new() };
             evidence.at_rest(&[vec![Some(borne); band.rows.len()]], &[1.0], &[1.0], &band);
             evidence.seen.iter().sum::<f64>()
         };

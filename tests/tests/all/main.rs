@@ -17,3 +17,4 @@ mod power;
 mod real_logs;
 mod robots;
 mod rollouts;
+mod ties;

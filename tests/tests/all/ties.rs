@@ -1,0 +1,33 @@
+//! What logs cannot tell is said beside what is named.
+
+use gapscope_datasets::{Recipe, generate};
+use gapscope_diagnosis::schema::FoundEffect;
+use gapscope_effects::{CoulombFriction, Effect, Payload};
+use gapscope_tests::{diagnose, robot};
+
+/// The body found where the last link of an arm, of .365 kg, carries `mass`, kg, in its centre.
+fn body_found(mass: f64) -> FoundEffect {
+    let model = robot("arm6");
+    let last = model.joints().last().unwrap();
+    let com = (last.inertia.first_moment / last.inertia.mass).to_array();
+    let load = Payload { joint: last.name.clone(), mass, com, inertia: [0.0; 6] };
+    let friction = model.joints().iter().map(|j| (j.name.clone(), 0.5)).collect();
+    let effects = [Effect::Payload(load), Effect::CoulombFriction(CoulombFriction { coulomb: friction })];
+    let log = |seed| generate(&model, &effects, seed, &Recipe::default(), "log.csv").unwrap();
+    let found = diagnose(&model, &[log(1), log(2), log(3)]).diagnosis.effects;
+    let bodies: Vec<FoundEffect> = found.into_iter().filter(|e| e.kind != "coulomb_friction").collect();
+    assert_eq!(bodies.len(), 1, "{bodies:#?}");
+    bodies[0].clone()
+}
+
+/// A last link that is off by as much as links are is likelier than a load; one that is off by its mass several times is not.
+#[test]
+fn a_light_load_could_be_the_last_link_and_a_heavy_one_could_not() {
+    let light = body_found(0.05);
+    assert_eq!(
+        (light.kind.as_str(), &light.indistinguishable_from[..]),
+        ("link_inertia_error", &["payload".to_owned()][..])
+    );
+    let heavy = body_found(1.0);
+    assert_eq!((heavy.kind.as_str(), heavy.indistinguishable_from.len()), ("payload", 0), "{heavy:#?}");
+}

@@ -55,7 +55,7 @@ pub fn read_arrays(
         return Err(LogError::new(LogErrorKind::MissingJoint, "the robot has no joint that moves")
             .hint("Check the joint types in the URDF"));
     }
-    let request = Request { joints, options };
+    let request = Request { joints, options, look: false };
     let (mut episodes, mut findings, mut first_error) = (Vec::new(), Vec::new(), None);
     let mut good = 0;
     for run in runs {

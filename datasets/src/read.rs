@@ -2,9 +2,8 @@
 
 use crate::episode::Episode;
 use crate::error::{LogError, LogErrorKind};
-use crate::formats::{self, Request};
+use crate::formats::{self, Request, Run};
 use crate::options::ReadOptions;
-use crate::table::Table;
 use crate::time_stamps;
 use gapscope_dynamics::Finding;
 use rayon::prelude::*;
@@ -34,7 +33,7 @@ pub fn read_logs(
             .hint("Check the joint types in the URDF"));
     }
     let names = names(&paths);
-    let request = Request { joints, options };
+    let request = Request { joints, options, look: false };
     let files: Vec<(&Path, &String)> = paths.iter().copied().zip(&names).collect();
 
     let mut episodes: Vec<Episode> = Vec::new();
@@ -67,11 +66,13 @@ pub fn read_logs(
 /// The episodes of one file, and what there is to say about it.
 fn read_file(path: &Path, name: &str, request: &Request) -> Result<(Vec<Episode>, Vec<Finding>), LogError> {
     let (mut episodes, mut findings) = (Vec::new(), Vec::new());
-    let mut take = |table: Table| {
+    let mut take = |run: Run| {
+        let table = run.table(request)?;
         let name = format!("{name}{}", table.label);
         let (parts, notes) = time_stamps::split(table, &name);
         findings.extend(notes.into_iter().map(|note| Finding::new(&name, note)));
         episodes.extend(parts);
+        Ok(())
     };
     formats::open(path)
         .and_then(|reader| reader.runs(request, &mut take))

@@ -142,7 +142,7 @@ pub struct Diagnose {
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
 pub struct Inspect {
-    /// Logs, as `diagnose` reads them; without --model only CSV
+    /// Logs, as `diagnose` reads them
     #[arg(required = true)]
     pub logs: Vec<PathBuf>,
     /// Robot description to hold the logs against: URDF, xacro or MJCF

@@ -5,7 +5,7 @@ use crate::robot::{self, Description};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use gapscope_datasets::{
-    Calibration, ColumnMap, Doubt, Episode, Fault, Faults, LONGEST_STEP, LogError, ReadOptions, check_logs, digest,
+    Calibration, ColumnMap, Doubt, Episode, Fault, LONGEST_STEP, LogError, ReadOptions, check_logs, digest,
     find_faults, mend, read_arrays, read_logs,
 };
 use gapscope_diagnosis::Origin;
@@ -57,10 +57,15 @@ impl Loaded {
         faults.chain(self.doubts.iter().map(|doubt| format!("In doubt: {}", doubt.question))).collect()
     }
 
-    /// What is wrong with the logs and what was odd, in lines free of control characters.
+    /// What is wrong with the logs and what was odd, in lines.
+    pub fn said(&self) -> Vec<String> {
+        self.warnings().into_iter().chain(self.findings.iter().cloned()).collect()
+    }
+
+    /// The same, free of control characters.
     pub fn notes(&self) -> Vec<String> {
         let clean = |line: &String| line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-        self.warnings().iter().chain(&self.findings).map(clean).collect()
+        self.said().iter().map(clean).collect()
     }
 
     /// Says on standard error what is wrong with the logs, for commands that have no place for it in their answer.
@@ -153,9 +158,7 @@ fn checked(
     episodes: Vec<Episode>,
     said: Vec<Finding>,
 ) -> Result<Loaded> {
-    // What is told by the torque that the robot takes has nothing to hold it against without one.
-    let told = episodes.iter().all(Episode::has_effort);
-    let mut found = if told { find_faults(&model, &episodes) } else { Faults::default() };
+    let mut found = find_faults(&model, &episodes);
     let (model, episodes) = if input.as_logged {
         found.faults.iter_mut().for_each(|fault| fault.mended = false);
         (model, episodes)

@@ -257,7 +257,7 @@ impl Topics {
 
 /// How many joints of the robot a group names; all that it names count where a map says which is which.
 fn matched(group: &Group, request: &Request) -> usize {
-    if request.options.map.is_empty() { joint_names::count(&group.names, request.joints) } else { group.names.len() }
+    if request.by_own_names() { group.names.len() } else { joint_names::count(&group.names, request.joints) }
 }
 
 /// Adds a column, unless it holds nothing.

@@ -50,6 +50,10 @@ impl Array {
 pub(crate) fn recording(arrays: Vec<Array>, rate: Option<f64>, request: &Request) -> Result<Recording, LogError> {
     let mut recording = Recording::default();
     let count = samples(&arrays, request)?;
+    if count == 0 {
+        return Err(LogError::new(LogErrorKind::Empty, "the run holds not one sample")
+            .hint("Check whether the logger ran; a log has one row per sample"));
+    }
     let names = joint_names(&arrays);
     add_time(&arrays, count, rate, request, &mut recording)?;
     let held: Vec<String> = arrays.iter().map(|array| format!("{} {:?}", array.name, array.shape)).collect();

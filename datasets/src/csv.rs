@@ -66,8 +66,7 @@ pub(crate) fn columns(contents: &Contents) -> Result<Recording, LogError> {
     let mut record = ByteRecord::new();
     while columns[0].len() < LOOK && reader.read_byte_record(&mut record).map_err(|error| unreadable(&error))? {
         let text = |at: usize| std::str::from_utf8(record.get(at).unwrap_or_default()).unwrap_or_default().trim();
-        let numbers: Vec<f64> =
-            (0..names.len()).map(|at| number(text(at), delimiter).unwrap_or(f64::NAN)).collect();
+        let numbers: Vec<f64> = (0..names.len()).map(|at| number(text(at), delimiter).unwrap_or(f64::NAN)).collect();
         // A row of units below the header.
         if columns[0].is_empty() && numbers.iter().all(|number| number.is_nan()) {
             recording.units = names.iter().enumerate().map(|(at, name)| (name.clone(), text(at).to_owned())).collect();

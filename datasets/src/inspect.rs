@@ -130,7 +130,11 @@ mod tests {
             Episode { joints: vec!["a".into()], time, position, effort: vec![vec![2.0; 500]], ..Episode::default() };
         let told = &inspect(&[episode])[0];
         assert!((told.rate - 250.0).abs() < 1e-6 && told.jitter < 1e-6 && told.samples == 500);
-        assert!(told.joints[0].moves && told.joints[0].effort == Some([2.0, 2.0]) && told.joints[0].effort_held == Some(1.0));
+        assert!(
+            told.joints[0].moves
+                && told.joints[0].effort == Some([2.0, 2.0])
+                && told.joints[0].effort_held == Some(1.0)
+        );
         assert_eq!(told.channels, ["position", "effort"]);
     }
 

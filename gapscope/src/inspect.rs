@@ -4,11 +4,15 @@ use crate::cli::{Input, Inspect};
 use crate::input::{Reading, fault_line, load_any, options, read};
 use crate::report::terminal::{column, fill, pad};
 use crate::report::{count, figure, percent, plain};
-use anyhow::{Context, Result};
-use gapscope_datasets::{Doubt, Episode, Fault, LogTraits, ReadOptions, determined, inspect, joints_of};
+use crate::{output, robot};
+use anyhow::{Context, Result, bail};
+use gapscope_datasets::{
+    Bound, Doubt, Episode, Fault, LogTraits, ReadOptions, determined, inspect, joints_of, suggest_map,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::path::Path;
 
 /// What `--json` prints, schema `gapscope.inspection/1`.
 #[derive(Debug, Serialize)]
@@ -45,8 +49,35 @@ pub fn run(args: &Inspect) -> Result<String> {
         episodes: args.episodes.clone(),
         ..Input::default()
     };
+    if let Some(file) = &args.suggest_map {
+        return suggest(&input, file);
+    }
     let inspection = inspected(&input)?;
     Ok(if args.json { serde_json::to_string(&inspection)? } else { text(&inspection) })
+}
+
+/// Writes a column map for the first log; what to say of it.
+fn suggest(input: &Input, file: &Path) -> Result<String> {
+    if file.exists() {
+        bail!("{} exists already; choose another name, or remove it", file.display());
+    }
+    let log = input.logs.first().context("no log is given")?;
+    let model = robot::read(&input.robot, &[])?.model(&input.robot, &input.reading.lock)?.model;
+    let map = suggest_map(log, &model, &options(input)?)?;
+    output::write(file, &map.text)?;
+    let mut text = format!("{}\n{} holds this map.", map.text, file.display());
+    if map.open.is_empty() {
+        let _ = write!(
+            text,
+            " The log is read with it: gapscope diagnose {} {} --map-file {}",
+            input.robot.display(),
+            log.display(),
+            file.display()
+        );
+    } else {
+        let _ = write!(text, " It does not do yet; complete it by hand. {}", map.open.join(". "));
+    }
+    Ok(text.chars().map(|c| if c.is_control() && c != '\n' { ' ' } else { c }).collect())
 }
 
 /// What the logs are like; without a robot where its path is empty.
@@ -61,12 +92,12 @@ pub fn inspected(input: &Input) -> Result<Inspection> {
             Some(first) => first.joints(),
             None => joints_of(input.logs.first().context("no log is given")?, &options)?,
         };
-        let (episodes, notes) = read(input, &joints, &options)?;
+        let (episodes, notes) = read(input, &joints, &options, &|_| {})?;
         let findings = notes.iter().map(ToString::to_string).collect();
         let logs = inspect(&episodes);
         return Ok(Inspection { schema, logs, faults: vec![], doubts: vec![], findings, determined: BTreeMap::new() });
     }
-    let loaded = load_any(input)?;
+    let loaded = load_any(input, Some(Bound::DIAGNOSIS), &|_| {})?;
     let names = loaded.model.joints().iter().map(|joint| joint.name.clone());
     // Parameters are told by the torque that the motion takes.
     let told = if loaded.episodes.iter().all(Episode::has_effort) {

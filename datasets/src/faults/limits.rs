@@ -43,15 +43,7 @@ pub(super) fn search(model: &Model, episodes: &[&Episode]) -> Faults {
         );
         let changes = joints.iter().map(|&j| Change::Position(j, 1.0 / factor, 0.0)).collect();
         let all: Vec<usize> = (0..episodes.len()).collect();
-        found.faults.push(Fault::new(
-            &logs,
-            FaultKind::PositionScale,
-            &joints,
-            &all,
-            Some(factor),
-            evidence,
-            changes,
-        ));
+        found.faults.push(Fault::new(&logs, FaultKind::PositionScale, &joints, &all, Some(factor), evidence, changes));
         if !prismatic && places.iter().all(|place| place.largest <= WHOLE_RANGE) {
             found.doubts.push(Doubt {
                 question: "are the positions in degrees, or in per cent of a calibrated range? None passes 100, and they are read as degrees. If they are per cent, scale and zero of each joint are not known: give --calibration FILE".to_owned(),
@@ -83,6 +75,70 @@ impl Place {
             beyond: span.is_some_and(|span| excess(logs, joint, 1.0, low, high) > span),
             fits_converted: span.is_none() || excess(logs, joint, 1.0 / factor, low, high) < ZERO,
             largest: low.abs().max(high.abs()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::episode::Episode;
+    use crate::faults::{FaultKind, find_faults, mend};
+    use gapscope_dynamics::Model;
+
+    fn model() -> Model {
+        let link = |name: &str| {
+            format!(
+                "<link name=\"{name}\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>"
+            )
+        };
+        let joint = |name: &str, parent: &str, child: &str| {
+            format!(
+                "<joint name=\"{name}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{child}\"/><axis xyz=\"0 1 0\"/><limit lower=\"-2\" upper=\"2\" effort=\"5\" velocity=\"9\"/></joint>"
+            )
+        };
+        let text = format!(
+            "<robot name=\"two\"><link name=\"base\"/>{}{}{}{}</robot>",
+            link("upper"),
+            link("lower"),
+            joint("a", "base", "upper"),
+            joint("b", "upper", "lower")
+        );
+        Model::from_urdf(&text).unwrap().model
+    }
+
+    /// A log without torque whose joints swing by `size`, about a middle of `middle`.
+    fn log(size: f64, middle: f64) -> Episode {
+        let time: Vec<f64> = (0..100).map(|k| 0.02 * f64::from(k)).collect();
+        let row = |w: f64| time.iter().map(|t| middle + size * (w * t).sin()).collect::<Vec<f64>>();
+        let position = vec![row(2.0), row(3.0)];
+        Episode {
+            name: "run".into(),
+            joints: vec!["a".into(), "b".into()],
+            command: Some(position.clone()),
+            position,
+            time,
+            ..Episode::default()
+        }
+    }
+
+    #[test]
+    fn degrees_are_told_by_the_limits_and_mended_with_the_set_points() {
+        let (model, logs) = (model(), [log(60.0, 30.0)]);
+        let found = find_faults(&model, &logs);
+        assert_eq!(found.faults[0].kind, FaultKind::PositionScale);
+        assert!(found.doubts[0].question.contains("--calibration"), "{:?}", found.doubts);
+        let (_, mended) = mend(&model, &logs, &found.faults);
+        let expected = logs[0].position[1][7].to_radians();
+        assert!((mended[0].position[1][7] - expected).abs() < 1e-12);
+        assert!((mended[0].command.as_ref().unwrap()[1][7] - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn beyond_a_hundred_they_are_no_per_cent_and_beyond_all_limits_nothing_is_said() {
+        assert!(find_faults(&model(), &[log(50.0, 60.0)]).doubts.is_empty());
+        for (size, middle) in [(0.5, 0.2), (1.9, 0.5), (500.0, 0.0)] {
+            let found = find_faults(&model(), &[log(size, middle)]);
+            assert!(found.faults.is_empty() && found.doubts.is_empty(), "{size} {middle}: {found:?}");
         }
     }
 }

@@ -34,9 +34,11 @@ pub(super) fn read(folder: &Path, request: &Request, each: Each) -> Result<(), L
     }
     cut.end()?;
     if cut.found == 0 {
-        return Err(
-            LogError::new(LogErrorKind::Empty, "the dataset has no such episode").hint("Choose others: --episodes 0-9")
-        );
+        let (found, mend) = match request.options.episodes.is_empty() {
+            true => ("no episode of the dataset has a row", "Download the dataset with its data, or record it again"),
+            false => ("the dataset has no such episode", "Choose others: --episodes 0-9"),
+        };
+        return Err(LogError::new(LogErrorKind::Empty, found).hint(mend));
     }
     Ok(())
 }
@@ -205,7 +207,8 @@ impl Cut<'_, '_> {
         if recording.columns.iter().any(drives) {
             return Ok(());
         }
-        let what = if without_effort { "what drives the joints: a torque, or an action" } else { "the torque of the joints" };
+        let what =
+            if without_effort { "what drives the joints: a torque, or an action" } else { "the torque of the joints" };
         let others = if self.info.others.is_empty() {
             String::new()
         } else {

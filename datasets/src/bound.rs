@@ -2,6 +2,7 @@
 
 use crate::episode::Episode;
 use crate::options::Bound;
+use crate::time_stamps::LONGEST_STEP;
 use gapscope_dynamics::Finding;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -53,7 +54,7 @@ struct Size {
 
 impl Size {
     fn of(episode: &Episode) -> Size {
-        Size { seconds: episode.duration(), numbers: (episode.len() * episode.joint_count()) as f64 }
+        Size { seconds: seconds(episode), numbers: (episode.len() * episode.joint_count()) as f64 }
     }
 
     fn plus(self, other: Size, sign: f64) -> Size {
@@ -164,7 +165,7 @@ impl Keeper {
 
     /// Holds the stretches of a run that rank low enough.
     fn cut(&mut self, place: Place, episode: Episode) {
-        let parts = (episode.duration() / STRETCH).round().max(1.0) as usize;
+        let parts = (seconds(&episode) / STRETCH).round().max(1.0) as usize;
         let length = episode.len().div_ceil(parts);
         for part in 0..parts {
             let (from, to) = (part * length, ((part + 1) * length).min(episode.len()));
@@ -198,6 +199,16 @@ impl Keeper {
             self.size = self.size.plus(Size::of(&gone.episode), -1.0);
         }
     }
+}
+
+/// Length of a run, s. A clock that is no clock of seconds is mended later: until then it is taken for one of ms, or of µs.
+fn seconds(episode: &Episode) -> f64 {
+    let step = episode.dt();
+    let mut unit = 1.0;
+    while step * unit > LONGEST_STEP {
+        unit *= 1e-3;
+    }
+    episode.duration() * unit
 }
 
 /// The bits of a number reversed, as a fraction: 0, 1/2, 1/4, 3/4, …. Those of the lowest ranks are spread evenly.
@@ -261,6 +272,15 @@ mod tests {
         assert_eq!(names, ["a@0s", "a@320s", "a@640s", "a@960s", "a@1280s"]);
         assert!(findings[0].to_string().contains("1600 s, of which 100 s"), "{findings:?}");
         assert!(episodes[1].channel(Channel::Effort).is_some_and(|rows| rows[0].len() == episodes[1].len()));
+    }
+
+    #[test]
+    fn a_clock_in_milliseconds_makes_no_log_longer() {
+        let mut log = run("a", 60);
+        log.time.iter_mut().for_each(|time| *time *= 1e3);
+        let mut keeper = Keeper::new(bound(100.0));
+        keeper.add(0, log.clone());
+        assert_eq!(keeper.finish().0, [log]);
     }
 
     #[test]

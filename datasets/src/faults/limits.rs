@@ -10,6 +10,9 @@ use gapscope_dynamics::Model;
 /// Positions that were converted may pass the limits by this much, rad or m: the log's zero may be another than the URDF's.
 const ZERO: f64 = 0.5;
 
+/// A joint without limits that goes further than this from zero, rad, is in degrees.
+const FAR: f64 = 4.0 * std::f64::consts::PI;
+
 /// A position in per cent of a calibrated range goes no further than this.
 const WHOLE_RANGE: f64 = 100.0;
 
@@ -37,7 +40,7 @@ pub(super) fn search(model: &Model, episodes: &[&Episode]) -> Faults {
         }
         let names: Vec<&str> = beyond.iter().map(|&j| model.joints()[j].name.as_str()).collect();
         let evidence = format!(
-            "the positions are in {unit}, {} times what they should be: {} would pass the limits of the robot by more than their span, and all joints keep to theirs when converted",
+            "the positions are in {unit}, {} times what they should be: {} would pass the limits of the robot by more than their span, or go round many times, and all joints keep to theirs when converted",
             figure(factor),
             names.join(", ")
         );
@@ -71,10 +74,17 @@ impl Place {
         let high = logs.traits.iter().map(|traits| traits[joint].high).fold(f64::NEG_INFINITY, f64::max);
         let limits = &logs.model.joints()[joint].limits;
         let span = limits.lower.zip(limits.upper).map(|(lower, upper)| upper - lower).filter(|span| *span > 0.0);
+        let largest = low.abs().max(high.abs());
         Place {
-            beyond: span.is_some_and(|span| excess(logs, joint, 1.0, low, high) > span),
-            fits_converted: span.is_none() || excess(logs, joint, 1.0 / factor, low, high) < ZERO,
-            largest: low.abs().max(high.abs()),
+            beyond: match span {
+                Some(span) => excess(logs, joint, 1.0, low, high) > span,
+                None => !logs.is_prismatic(joint) && largest > FAR,
+            },
+            fits_converted: match span {
+                Some(_) => excess(logs, joint, 1.0 / factor, low, high) < ZERO,
+                None => logs.is_prismatic(joint) || largest / factor < FAR,
+            },
+            largest,
         }
     }
 }

@@ -163,7 +163,8 @@ impl Names {
         rest.retain(|word| !word.chars().all(|c| c.is_ascii_digit()));
         let unit = rest.iter().find_map(|word| UNITS.iter().find(|(unit, _)| unit == word)).copied();
         // `deg/s`: the second is part of the unit.
-        rest.retain(|word| !UNITS.iter().any(|(unit, _)| unit == word) && !(unit.is_some() && word == "s"));
+        let of_unit = |word: &String| UNITS.iter().any(|(unit, _)| unit == word) || (unit.is_some() && word == "s");
+        rest.retain(|word| !of_unit(word));
         let has = |list: &[&str]| rest.iter().any(|word| list.contains(&word.as_str()));
         let commanded = has(&COMMAND);
         let quantity = if has(&VELOCITY) {

@@ -68,10 +68,10 @@ fn a_run_in_any_container_has_the_same_diagnosis() {
         assert!(dir.path().join("out/report.html").exists());
         // LeRobot holds numbers of 32 bits; all others hold the same float64.
         if name.starts_with("lerobot") {
-            assert_eq!(text["effects"][0]["kind"], other["effects"][0]["kind"], "{name}");
-            let found = |answer: &Value| answer["effects"][0]["parameters"].clone();
-            alike(&found(&text), &found(&other), 1e-3, name);
-            alike(&text["gap"]["torque"]["rms"], &other["gap"]["torque"]["rms"], 1e-5, name);
+            assert_eq!(text["verdict"], other["verdict"], "{name}");
+            for place in ["/effects", "/gap/torque/rms", "/gap/one_step", "/shrink/rollout"] {
+                alike(text.pointer(place).unwrap(), other.pointer(place).unwrap(), 1e-5, name);
+            }
         } else {
             for key in ["verdict", "effects", "gap", "shrink", "alternatives"] {
                 assert_eq!(text[key], other[key], "{name}: {key}");

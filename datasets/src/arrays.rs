@@ -47,37 +47,34 @@ impl Array {
 }
 
 /// The run that arrays of a file hold. Without a time, `rate` in Hz makes one.
-pub(crate) fn recording(arrays: &[Array], rate: Option<f64>, request: &Request) -> Result<Recording, LogError> {
+pub(crate) fn recording(arrays: Vec<Array>, rate: Option<f64>, request: &Request) -> Result<Recording, LogError> {
     let mut recording = Recording::default();
-    let count = samples(arrays, request)?;
-    let names = joint_names(arrays);
-    add_time(arrays, count, rate, request, &mut recording)?;
+    let count = samples(&arrays, request)?;
+    if count == 0 {
+        return Err(LogError::new(LogErrorKind::Empty, "the run holds not one sample")
+            .hint("Check whether the logger ran; a log has one row per sample"));
+    }
+    let names = joint_names(&arrays);
+    add_time(&arrays, count, rate, request, &mut recording)?;
+    let held: Vec<String> = arrays.iter().map(|array| format!("{} {:?}", array.name, array.shape)).collect();
     let mut channels = Vec::new();
     let mut passed_over = Vec::new();
-    for array in arrays.iter().filter(|array| !array.values.is_empty()) {
+    for array in arrays.into_iter().filter(|array| !array.values.is_empty()) {
+        let (name, is_time, scalar) = (array.name.clone(), is_time(&array), array.values.len() == 1);
+        let channel = channel_names::channel(array.own_name()).filter(|_| !is_time);
         let Some(columns) = columns(array, count) else {
-            passed_over.push(array);
+            passed_over.extend((!scalar).then_some(name));
             continue;
         };
-        // A map names columns as the file does.
-        if request.options.map.is_empty() && is_time(array) {
-            continue;
-        }
-        if !request.options.map.is_empty() {
+        if request.by_own_names() {
             for (at, values) in columns.iter().enumerate() {
-                let name = if columns.len() == 1 { array.name.clone() } else { format!("{}[{at}]", array.name) };
-                recording.add(name, values.clone());
+                let own = if columns.len() == 1 { name.clone() } else { format!("{name}[{at}]") };
+                recording.add(own, values.clone());
             }
         }
-        let Some(channel) = channel_names::channel(array.own_name()).filter(|_| !is_time(array)) else {
-            continue;
-        };
+        let Some(channel) = channel.filter(|_| !request.look) else { continue };
         if channels.contains(&channel) {
-            recording.notes.push(format!(
-                "`{}` is not read: another array is the {} already",
-                array.name,
-                channel.name()
-            ));
+            recording.notes.push(format!("`{name}` is not read: another array is the {} already", channel.name()));
             continue;
         }
         channels.push(channel);
@@ -92,11 +89,10 @@ pub(crate) fn recording(arrays: &[Array], rate: Option<f64>, request: &Request) 
     if names.is_none() && !channels.is_empty() {
         recording.notes.push("the file does not name its joints: they are taken in the robot's order".to_owned());
     }
-    require(&channels, arrays, request)?;
-    let names: Vec<&str> =
-        passed_over.iter().filter(|array| array.values.len() > 1).map(|array| array.name.as_str()).take(8).collect();
-    if !names.is_empty() {
-        recording.notes.push(format!("arrays that are not read: {}", names.join(", ")));
+    require(&channels, &held, request)?;
+    if !passed_over.is_empty() {
+        passed_over.truncate(8);
+        recording.notes.push(format!("arrays that are not read: {}", passed_over.join(", ")));
     }
     Ok(recording)
 }
@@ -108,38 +104,45 @@ pub(crate) fn columns_or_whole(held: Vec<Array>, request: &Request) -> Result<Re
             && array.shape.len() == 1
     };
     if !held.iter().any(native) {
-        return recording(&held, None, request);
+        return recording(held, None, request);
     }
     let flat = held.into_iter().filter(|array| array.shape.len() == 1 && array.texts.is_empty());
     Ok(Recording { columns: flat.map(|array| (array.name, array.values)).collect(), ..Recording::default() })
 }
 
-/// An error where the arrays that no log can do without are missing, and no map says where they are.
-fn require(channels: &[Channel], arrays: &[Array], request: &Request) -> Result<(), LogError> {
-    if !request.options.map.is_empty() {
+/// An error where the arrays that no log can do without are missing among `held`, and no map says where they are.
+fn require(channels: &[Channel], held: &[String], request: &Request) -> Result<(), LogError> {
+    if request.by_own_names() {
         return Ok(());
     }
-    for needed in [Channel::Position, Channel::Effort] {
-        let by_link = needed == Channel::Effort && channels.contains(&Channel::EffortLink);
-        if !channels.contains(&needed) && !by_link {
-            let held: Vec<String> =
-                arrays.iter().take(12).map(|array| format!("{} {:?}", array.name, array.shape)).collect();
-            if arrays.iter().any(|array| array.name.starts_with("observation.")) {
-                return Err(LogError::new(LogErrorKind::MissingColumn, "this is a part of a LeRobot dataset")
-                    .hint("Give the dataset's folder, with meta/info.json in it; --episodes chooses"));
-            }
-            let joint = request.joints.first().map_or("joint1", String::as_str);
-            return Err(LogError::new(
-                LogErrorKind::MissingColumn,
-                format!("no array holds the {} of the joints; the file holds {}", needed.name(), held.join(", ")),
-            )
-            .hint(format!(
-                "Name it `{0}`, of shape samples × joints, or map its columns: --map \"{0}.{joint}=<array>[0]\"",
-                needed.name()
-            )));
-        }
+    let drives = |channel: &Channel| match request.options.without_effort {
+        true => channel.drives() || *channel == Channel::EffortLink,
+        false => matches!(channel, Channel::Effort | Channel::EffortLink),
+    };
+    let lacks = match () {
+        () if !channels.contains(&Channel::Position) => Channel::Position,
+        () if !channels.iter().any(drives) => Channel::Effort,
+        () => return Ok(()),
+    };
+    if held.iter().any(|name| name.starts_with("observation.")) {
+        return Err(LogError::new(LogErrorKind::MissingColumn, "this is a part of a LeRobot dataset")
+            .hint("Give the dataset's folder, with meta/info.json in it; --episodes chooses"));
     }
-    Ok(())
+    let what = match lacks {
+        Channel::Effort if request.options.without_effort => {
+            "effort of the joints, nor what stands for it (command, current, voltage)"
+        }
+        Channel::Effort => "effort of the joints",
+        _ => "position of the joints",
+    };
+    let shown = held[..held.len().min(12)].join(", ");
+    let joint = request.joints.first().map_or("joint1", String::as_str);
+    Err(LogError::new(LogErrorKind::MissingColumn, format!("no array holds the {what}; the file holds {shown}")).hint(
+        format!(
+            "Name it `{0}`, of shape samples × joints, or map its columns: --map \"{0}.{joint}=<array>[0]\"",
+            lacks.name()
+        ),
+    ))
 }
 
 fn is_time(array: &Array) -> bool {
@@ -160,7 +163,9 @@ fn samples(arrays: &[Array], request: &Request) -> Result<usize, LogError> {
         Some([a, b]) => Some(if *a == request.joints.len() && b > a { *b } else { *a }),
         _ => None,
     };
-    length.ok_or_else(|| {
+    // Nothing is known by its name: there are more samples than of anything else.
+    let longest = || arrays.iter().filter(|array| array.texts.is_empty()).flat_map(Array::lengths).max();
+    length.or_else(|| longest().filter(|_| request.by_own_names())).ok_or_else(|| {
         let names: Vec<&str> = arrays.iter().take(12).map(|array| array.name.as_str()).collect();
         LogError::new(
             LogErrorKind::MissingColumn,
@@ -171,10 +176,11 @@ fn samples(arrays: &[Array], request: &Request) -> Result<usize, LogError> {
 }
 
 /// The columns of an array with one number, or one row, a sample; joint by joint.
-fn columns(array: &Array, count: usize) -> Option<Vec<Vec<f64>>> {
-    let values = &array.values;
-    match array.lengths().as_slice() {
-        [samples] if *samples == count => Some(vec![values.clone()]),
+fn columns(array: Array, count: usize) -> Option<Vec<Vec<f64>>> {
+    let lengths = array.lengths();
+    let values = array.values;
+    match lengths.as_slice() {
+        [samples] if *samples == count => Some(vec![values]),
         [samples, width] if *samples == count => {
             Some((0..*width).map(|j| values.iter().skip(j).step_by(*width).copied().collect()).collect())
         }
@@ -202,7 +208,7 @@ fn add_time(
     recording: &mut Recording,
 ) -> Result<(), LogError> {
     if let Some(time) = arrays.iter().find(|array| is_time(array)) {
-        if request.options.map.is_empty() {
+        if !request.by_own_names() {
             recording.add(time.own_name(), time.values.clone());
         }
         return Ok(());
@@ -217,6 +223,7 @@ fn add_time(
     let (rate, why) = match (named, rate) {
         (Some((array, rate)), _) => (rate, format!("from `{}`", array.name)),
         (None, Some(rate)) => (rate, "which such files usually have".to_owned()),
+        (None, None) if request.look => return Ok(()),
         (None, None) => {
             return Err(LogError::new(LogErrorKind::MissingColumn, "no array holds the time")
                 .column("time")

@@ -3,7 +3,7 @@
 use crate::episode::Channel;
 
 /// Names of arrays that hold one quantity of all joints, in lower case without `_`, `-`, spaces and dots.
-const USUAL: [(Channel, &[&str]); 6] = [
+const USUAL: [(Channel, &[&str]); 8] = [
     (
         Channel::Position,
         &[
@@ -70,6 +70,11 @@ const USUAL: [(Channel, &[&str]); 6] = [
         ],
     ),
     (Channel::EffortLink, &["effortlink", "linktorque", "tauj", "jointtorquesensor"]),
+    (
+        Channel::Current,
+        &["currents", "motorcurrent", "motorcurrents", "jointcurrent", "jointcurrents", "presentcurrent", "imotor"],
+    ),
+    (Channel::Voltage, &["voltages", "motorvoltage", "motorvoltages", "jointvoltage", "jointvoltages"]),
     (Channel::Temperature, &["temperature", "temperatures", "temp", "motortemperature"]),
 ];
 

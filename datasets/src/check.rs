@@ -9,6 +9,7 @@ mod units;
 mod velocity;
 
 pub(crate) use effort::{Fit, fit};
+pub(crate) use position::excess;
 pub(crate) use signal::Traits;
 pub(crate) use velocity::Relation;
 

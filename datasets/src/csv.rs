@@ -5,7 +5,8 @@ use crate::error::{LogError, LogErrorKind};
 use crate::header::plan;
 use crate::joint_names;
 use crate::options::ReadOptions;
-use crate::rows::{ALLOW, Rows, line_at, shown, unreadable};
+use crate::recording::Recording;
+use crate::rows::{ALLOW, Rows, line_at, number, shown, unreadable};
 use crate::table::Table;
 use crate::units;
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
@@ -51,6 +52,30 @@ pub(crate) fn parse(contents: &Contents, joints: &[String], options: &ReadOption
         episode: plan.episode(columns.numbers, &columns.dropped, joints),
         notes,
     })
+}
+
+/// Rows that a look at a log takes in.
+const LOOK: usize = 20_000;
+
+/// The columns of a log's text under their own names, as far as a look goes; NaN where a cell holds no number.
+pub(crate) fn columns(contents: &Contents) -> Result<Recording, LogError> {
+    let (delimiter, mut reader) = open(&contents.bytes);
+    let names = header(&mut reader)?;
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
+    let mut recording = Recording::default();
+    let mut record = ByteRecord::new();
+    while columns[0].len() < LOOK && reader.read_byte_record(&mut record).map_err(|error| unreadable(&error))? {
+        let text = |at: usize| std::str::from_utf8(record.get(at).unwrap_or_default()).unwrap_or_default().trim();
+        let numbers: Vec<f64> = (0..names.len()).map(|at| number(text(at), delimiter).unwrap_or(f64::NAN)).collect();
+        // A row of units below the header.
+        if columns[0].is_empty() && numbers.iter().all(|number| number.is_nan()) {
+            recording.units = names.iter().enumerate().map(|(at, name)| (name.clone(), text(at).to_owned())).collect();
+            continue;
+        }
+        columns.iter_mut().zip(numbers).for_each(|(column, number)| column.push(number));
+    }
+    recording.columns = names.into_iter().zip(columns).filter(|(name, _)| !name.is_empty()).collect();
+    Ok(recording)
 }
 
 fn open(text: &[u8]) -> (u8, Reader<&[u8]>) {

@@ -365,13 +365,17 @@ impl Header<'_> {
 
     /// The joints of `missing`, where the log names no joint but some of the robot's: a gripper that was not logged.
     fn absent(&self, channel: Channel, missing: &[String]) -> Vec<String> {
+        let mapped = self.joints.iter().map(String::as_str).filter(|joint| {
+            Channel::ALL.into_iter().any(|channel| self.map.source(channel, joint).is_some_and(|(_, named)| named))
+        });
         let named: BTreeSet<&str> = self
             .columns
             .iter()
-            .filter(|column| !self.map.ignores(column))
+            .filter(|column| !self.map.ignores(column) && !self.map.takes(column))
             .filter_map(|column| column.split_once('.'))
             .filter(|(channel, _)| Channel::from_name(channel).is_some())
             .map(|(_, joint)| joint)
+            .chain(mapped)
             .collect();
         let known = |joint: &str| self.joints.iter().any(|known| known == joint);
         let silent = missing.iter().all(|joint| !named.contains(joint.as_str()));

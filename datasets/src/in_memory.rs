@@ -1,11 +1,12 @@
 //! Logs that are in memory already, as named arrays in the place of files.
 
 use crate::arrays::{self, Array};
+use crate::bound::Keeper;
 use crate::episode::Episode;
 use crate::error::{LogError, LogErrorKind};
 use crate::formats::Request;
 use crate::options::ReadOptions;
-use crate::read::{add, merged};
+use crate::read::merged;
 use crate::time_stamps;
 use gapscope_dynamics::Finding;
 
@@ -55,15 +56,15 @@ pub fn read_arrays(
         return Err(LogError::new(LogErrorKind::MissingJoint, "the robot has no joint that moves")
             .hint("Check the joint types in the URDF"));
     }
-    let request = Request { joints, options };
-    let (mut episodes, mut findings, mut first_error) = (Vec::new(), Vec::new(), None);
+    let request = Request { joints, options, look: false };
+    let (mut kept, mut findings, mut first_error) = (Keeper::new(options.bound), Vec::new(), None);
     let mut good = 0;
-    for run in runs {
+    for (number, run) in runs.iter().enumerate() {
         match read_run(run, &request) {
             Ok((parts, notes)) => {
                 good += 1;
                 findings.extend(notes);
-                parts.into_iter().for_each(|part| add(part, &mut episodes, &mut findings));
+                parts.into_iter().for_each(|part| kept.add(number, part));
             }
             Err(error) if options.skip_bad_files => {
                 findings.push(Finding::new(run.name.as_str(), format!("left out: {error}")));
@@ -72,6 +73,8 @@ pub fn read_arrays(
             Err(error) => return Err(error),
         }
     }
+    let (episodes, notes) = kept.finish();
+    findings.extend(notes);
     match first_error {
         Some(error) if good == 0 => Err(error),
         _ => Ok((episodes, merged(findings))),

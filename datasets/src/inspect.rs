@@ -1,9 +1,10 @@
 //! What logs are like by themselves: rate, gaps, jitter, steps, and what each joint does in them.
 
 use crate::check::Traits;
-use crate::container;
 use crate::episode::{Channel, Episode};
 use crate::error::{LogError, LogErrorKind};
+use crate::formats;
+use crate::options::ReadOptions;
 use crate::robust::quantile;
 use serde::Serialize;
 use std::path::Path;
@@ -46,10 +47,12 @@ pub struct JointTraits {
     pub step: Option<f64>,
     /// Single samples that jump.
     pub glitches: usize,
-    /// Least and greatest effort, N m or N.
-    pub effort: [f64; 2],
-    /// Share of the samples whose effort repeats the one before.
-    pub effort_held: f64,
+    /// Least and greatest effort, N m or N, where the log holds it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub effort: Option<[f64; 2]>,
+    /// Share of the samples whose effort repeats the one before, where the log holds it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub effort_held: Option<f64>,
 }
 
 /// What logs are like.
@@ -63,8 +66,11 @@ fn log(episode: &Episode) -> LogTraits {
     let mut off: Vec<f64> = steps.iter().map(|step| (step - dt).abs() / dt.max(1e-300)).collect();
     let joint = |(j, name): (usize, &String)| {
         let traits = Traits::of(&episode.time, &episode.position[j], dt);
-        let effort = &episode.effort[j];
-        let held = effort.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        let effort = episode.effort.get(j).filter(|row| row.iter().all(|effort| effort.is_finite()));
+        let repeats = |row: &Vec<f64>| row.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        let range = |row: &Vec<f64>| {
+            row.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(*x), high.max(*x)])
+        };
         JointTraits {
             name: name.clone(),
             moves: traits.moves(),
@@ -73,10 +79,8 @@ fn log(episode: &Episode) -> LogTraits {
             noise: traits.noise,
             step: traits.step,
             glitches: traits.glitches.len(),
-            effort: effort
-                .iter()
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(*x), high.max(*x)]),
-            effort_held: held as f64 / effort.len().saturating_sub(1).max(1) as f64,
+            effort: effort.map(range),
+            effort_held: effort.map(|row| repeats(row) as f64 / row.len().saturating_sub(1).max(1) as f64),
         }
     };
     let has = |channel: &Channel| episode.channel(*channel).is_some_and(|samples| !samples.is_empty());
@@ -92,27 +96,24 @@ fn log(episode: &Episode) -> LogTraits {
     }
 }
 
-/// The joints whose position a log carries under native names, in the order of its columns.
+/// The joints whose position a log carries, in its order: by their names, or by number where it has none.
 ///
 /// # Errors
-/// A file that cannot be read, or without such a column.
-pub fn joints_of(path: &Path) -> Result<Vec<String>, LogError> {
-    let of_other_kind = |error: LogError| match error.kind {
-        LogErrorKind::UnknownContainer => error.hint("Name the robot with --model: its joints are looked for"),
-        _ => error,
+/// A file that cannot be read, or in which no column is known to be a position.
+pub fn joints_of(path: &Path, options: &ReadOptions) -> Result<Vec<String>, LogError> {
+    let positions = |columns: &[(String, Vec<f64>)]| -> Vec<String> {
+        let start = format!("{}.", Channel::Position.name());
+        columns.iter().filter_map(|(name, _)| name.trim().strip_prefix(&start).map(str::to_owned)).collect()
     };
-    let contents = container::read(path).map_err(|error| of_other_kind(error).file(path.display().to_string()))?;
-    let text = String::from_utf8_lossy(&contents.bytes);
-    let header = text.lines().find(|line| line.contains("position.")).unwrap_or_default();
-    let names: Vec<String> = header
-        .split([',', ';', '\t'])
-        .filter_map(|name| name.trim().trim_matches(['"', '#']).trim().strip_prefix("position."))
-        .map(str::to_owned)
-        .collect();
+    let seen = formats::look(path, options, true)?;
+    let mut names = positions(&seen.columns);
+    if names.is_empty() {
+        names = formats::look(path, options, false).map(|seen| positions(&seen.columns)).unwrap_or_default();
+    }
     if names.is_empty() {
         return Err(LogError::new(LogErrorKind::MissingColumn, "no column is named position.<joint>")
             .file(path.display().to_string())
-            .hint("Name the robot with --model, and the columns with --map"));
+            .hint("Name the robot with --model: its joints are looked for, and --suggest-map writes a map"));
     }
     Ok(names)
 }
@@ -129,7 +130,11 @@ mod tests {
             Episode { joints: vec!["a".into()], time, position, effort: vec![vec![2.0; 500]], ..Episode::default() };
         let told = &inspect(&[episode])[0];
         assert!((told.rate - 250.0).abs() < 1e-6 && told.jitter < 1e-6 && told.samples == 500);
-        assert!(told.joints[0].moves && told.joints[0].effort == [2.0, 2.0] && told.joints[0].effort_held == 1.0);
+        assert!(
+            told.joints[0].moves
+                && told.joints[0].effort == Some([2.0, 2.0])
+                && told.joints[0].effort_held == Some(1.0)
+        );
         assert_eq!(told.channels, ["position", "effort"]);
     }
 
@@ -138,8 +143,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("run.csv");
         std::fs::write(&file, "# made by hand\ntime,position.b,position.a,effort.a\n0,1,2,3\n").unwrap();
-        assert_eq!(joints_of(&file).unwrap(), ["b", "a"]);
+        assert_eq!(joints_of(&file, &ReadOptions::default()).unwrap(), ["b", "a"]);
         std::fs::write(&file, "time,q\n0,1\n").unwrap();
-        assert!(joints_of(&file).unwrap_err().to_string().contains("--model"));
+        assert!(joints_of(&file, &ReadOptions::default()).unwrap_err().to_string().contains("--model"));
     }
 }

@@ -7,6 +7,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod arrays;
+mod bound;
 mod calibration;
 mod channel_names;
 mod check;
@@ -38,6 +39,7 @@ mod rows;
 mod scale;
 mod sensors;
 mod servo;
+mod suggest;
 mod table;
 mod time_stamps;
 mod trajectory;
@@ -45,6 +47,7 @@ mod transitions;
 mod units;
 mod write;
 
+pub use bound::ALL_LOGS;
 pub use calibration::Calibration;
 pub use check::check_logs;
 pub use column_map::{ColumnMap, Source};
@@ -55,13 +58,14 @@ pub use faults::{Doubt, Fault, FaultKind, Faults, determined, find_faults, mend}
 pub use generate::{GenerateError, Recipe, Robot, follow, generate, record};
 pub use in_memory::{Arrays, read_arrays};
 pub use inspect::{JointTraits, LogTraits, inspect, joints_of};
-pub use options::ReadOptions;
+pub use options::{Bound, ReadOptions};
 pub use perturb::{Perturbation, other_body};
-pub use read::read_logs;
+pub use read::{read_logs, read_logs_telling};
 pub use reference::{Excitation, Reference, ReferenceError, ReferenceKind, excitation};
 pub use resample::{Uniform, derive_velocity, resample};
 pub use sensors::Sensors;
 pub use servo::Servo;
+pub use suggest::{SuggestedMap, suggest_map};
 pub use time_stamps::LONGEST_STEP;
 pub use trajectory::Trajectory;
 pub use transitions::transitions;

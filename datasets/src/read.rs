@@ -1,17 +1,21 @@
 //! A set of log files in.
 
+use crate::bound::Keeper;
 use crate::episode::Episode;
 use crate::error::{LogError, LogErrorKind};
-use crate::formats::{self, Request};
+use crate::formats::{self, Request, Run};
 use crate::options::ReadOptions;
-use crate::table::Table;
 use crate::time_stamps;
 use gapscope_dynamics::Finding;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Reads log files, CSV or gzipped CSV, into episodes, in the order of `paths`.
+/// Files that are read at the same time are no larger than this together, bytes; a larger one, or a folder, is read alone.
+const AT_ONCE: u64 = 1 << 28;
+
+/// Reads logs of any format into episodes, in the order of `paths`.
 ///
 /// `joints` are the robot's joints in model order; every file must feed the position and the effort of each.
 /// A gap in time splits a file into several episodes; parts of fewer than 20 samples are left out, so that a file,
@@ -24,6 +28,19 @@ pub fn read_logs(
     joints: &[String],
     options: &ReadOptions,
 ) -> Result<(Vec<Episode>, Vec<Finding>), LogError> {
+    read_logs_telling(paths, joints, options, &|_| {})
+}
+
+/// As [`read_logs`]; `tell` gets a word on how far the reading is, now and then.
+///
+/// # Errors
+/// As those of [`read_logs`].
+pub fn read_logs_telling(
+    paths: &[impl AsRef<Path>],
+    joints: &[String],
+    options: &ReadOptions,
+    tell: &(dyn Fn(&str) + Sync),
+) -> Result<(Vec<Episode>, Vec<Finding>), LogError> {
     let mut findings = Vec::new();
     let paths = distinct(paths, &mut findings);
     if paths.is_empty() {
@@ -34,21 +51,22 @@ pub fn read_logs(
             .hint("Check the joint types in the URDF"));
     }
     let names = names(&paths);
-    let request = Request { joints, options };
-    let files: Vec<(&Path, &String)> = paths.iter().copied().zip(&names).collect();
+    let request = Request { joints, options, look: false };
+    let files: Vec<File> =
+        paths.iter().zip(&names).enumerate().map(|(number, (path, name))| File { number, path, name }).collect();
+    let told = Told { tell, runs: AtomicUsize::new(0) };
 
-    let mut episodes: Vec<Episode> = Vec::new();
+    let mut kept = Keeper::new(options.bound);
     let mut first_error = None;
     let mut good = 0;
-    // A few files at a time: what is not taken over yet stays small beside what is.
-    for files in files.chunks(2 * rayon::current_num_threads()) {
-        let read: Vec<_> = files.par_iter().map(|(path, name)| (name, read_file(path, name, &request))).collect();
+    for files in at_once(&files) {
+        let read: Vec<_> = files.par_iter().map(|file| (file.name, file.read(&request, &told))).collect();
         for (name, file) in read {
             match file {
-                Ok((parts, notes)) => {
+                Ok((own, notes)) => {
                     good += 1;
                     findings.extend(notes);
-                    parts.into_iter().for_each(|part| add(part, &mut episodes, &mut findings));
+                    kept.merge(own);
                 }
                 Err(error) if options.skip_bad_files => {
                     findings.push(Finding::new(name.as_str(), format!("left out: {error}")));
@@ -58,35 +76,66 @@ pub fn read_logs(
             }
         }
     }
+    let (episodes, notes) = kept.finish();
+    findings.extend(notes);
     match first_error {
         Some(error) if good == 0 => Err(error),
         _ => Ok((episodes, merged(findings))),
     }
 }
 
-/// The episodes of one file, and what there is to say about it.
-fn read_file(path: &Path, name: &str, request: &Request) -> Result<(Vec<Episode>, Vec<Finding>), LogError> {
-    let (mut episodes, mut findings) = (Vec::new(), Vec::new());
-    let mut take = |table: Table| {
-        let name = format!("{name}{}", table.label);
-        let (parts, notes) = time_stamps::split(table, &name);
-        findings.extend(notes.into_iter().map(|note| Finding::new(&name, note)));
-        episodes.extend(parts);
+/// Files, a few at a time: what is not taken over yet stays small.
+fn at_once<'a>(files: &'a [File<'a>]) -> Vec<&'a [File<'a>]> {
+    let size = |file: &File| match std::fs::metadata(file.path) {
+        Ok(meta) if meta.is_file() => meta.len(),
+        _ => AT_ONCE,
     };
-    formats::open(path)
-        .and_then(|reader| reader.runs(request, &mut take))
-        .map_err(|error| if error.file.is_empty() { error.file(path.display().to_string()) } else { error })?;
-    Ok((episodes, findings))
+    let most = 2 * rayon::current_num_threads();
+    let (mut groups, mut start, mut sum) = (Vec::new(), 0, 0);
+    for (at, file) in files.iter().enumerate() {
+        let own = size(file);
+        if at > start && (sum + own > AT_ONCE || at - start >= most) {
+            groups.push(&files[start..at]);
+            (start, sum) = (at, 0);
+        }
+        sum += own;
+    }
+    groups.push(&files[start..]);
+    groups
 }
 
-/// Takes an episode in, unless the same samples are there already.
-pub(crate) fn add(part: Episode, episodes: &mut Vec<Episode>, findings: &mut Vec<Finding>) {
-    match episodes.iter().find(|earlier| earlier.time == part.time && earlier.position == part.position) {
-        Some(earlier) => findings.push(Finding::new(
-            &part.name,
-            format!("holds the same samples as {}: left out, for it would be held out against itself", earlier.name),
-        )),
-        None => episodes.push(part),
+/// Who is told how far the reading is.
+struct Told<'a> {
+    tell: &'a (dyn Fn(&str) + Sync),
+    runs: AtomicUsize,
+}
+
+/// A file, or a folder that is one log.
+struct File<'a> {
+    number: usize,
+    path: &'a Path,
+    name: &'a String,
+}
+
+impl File<'_> {
+    /// What is kept of its episodes, and what there is to say about it.
+    fn read(&self, request: &Request, told: &Told) -> Result<(Keeper, Vec<Finding>), LogError> {
+        let (mut kept, mut findings) = (Keeper::new(request.options.bound), Vec::new());
+        (told.tell)(&format!("reading {}", self.name));
+        let mut take = |run: Run| {
+            let table = run.table(request)?;
+            let name = format!("{}{}", self.name, table.label);
+            let (parts, notes) = time_stamps::split(table, &name);
+            findings.extend(notes.into_iter().map(|note| Finding::new(&name, note)));
+            parts.into_iter().for_each(|part| kept.add(self.number, part));
+            let runs = 1 + told.runs.fetch_add(1, Ordering::Relaxed);
+            (told.tell)(&format!("reading {}, run {runs} of all logs", self.name));
+            Ok(())
+        };
+        formats::open(self.path)
+            .and_then(|reader| reader.runs(request, &mut take))
+            .map_err(|error| if error.file.is_empty() { error.file(self.path.display().to_string()) } else { error })?;
+        Ok((kept, findings))
     }
 }
 

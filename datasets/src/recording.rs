@@ -7,6 +7,7 @@ use crate::formats::Request;
 use crate::header::plan;
 use crate::joint_names;
 use crate::table::Table;
+use std::collections::BTreeMap;
 
 /// One run in a container: columns of one length. A column is named as in the container, or natively where the
 /// reader knows what it is (`time`, `position.<joint>`).
@@ -18,6 +19,8 @@ pub(crate) struct Recording {
     pub columns: Vec<(String, Vec<f64>)>,
     /// What there is to say about the file.
     pub notes: Vec<String>,
+    /// Units that a row of the file gives to columns; reading applies them. Filled by a look alone.
+    pub units: BTreeMap<String, String>,
 }
 
 impl Recording {
@@ -42,10 +45,12 @@ impl Recording {
         }
         let mut numbers = Vec::with_capacity(plan.feeds.len());
         let mut dropped = Vec::new();
-        for feed in &plan.feeds {
+        for (at, feed) in plan.feeds.iter().enumerate() {
             let scale = if feed.channel.is_none() { feed.scale * time_scale } else { feed.scale };
-            // Each column is taken once, but for a temperature that joints share.
-            let values = &self.columns[feed.index].1;
+            // Columns are many numbers: they are moved, but for those that feed something else, too.
+            let shared = plan.feeds[at + 1..].iter().any(|other| other.index == feed.index);
+            let column = &mut self.columns[feed.index].1;
+            let mut values = if shared { column.clone() } else { std::mem::take(column) };
             if values.len() != count {
                 return Err(LogError::new(
                     LogErrorKind::RaggedRow,
@@ -54,8 +59,9 @@ impl Recording {
                 .column(&self.columns[feed.index].0)
                 .hint("Every quantity needs one number for each sample"));
             }
-            let values: Vec<f64> =
-                values.iter().map(|value| if scale == 1.0 { *value } else { value * scale }).collect();
+            if scale != 1.0 {
+                values.iter_mut().for_each(|value| *value *= scale);
+            }
             let unknown = request.options.without_effort && feed.channel.is_some_and(Channel::may_be_unknown);
             let bad = |value: &f64| !(value.is_finite() || unknown && value.is_nan());
             if let Some(bad) = values.iter().position(bad) {

@@ -166,10 +166,7 @@ impl<'a> Rows<'a> {
         if cell.is_empty() && self.options.without_effort && feed.channel.is_some_and(Channel::may_be_unknown) {
             return Ok(f64::NAN);
         }
-        let text = std::str::from_utf8(cell).ok();
-        // Where commas do not part cells, one in a number is its decimal mark.
-        let comma = |text: &str| text.replace(',', ".").parse().ok().filter(|_| self.delimiter != b',');
-        let parsed = text.and_then(|text| text.parse::<f64>().ok().or_else(|| comma(text)));
+        let parsed = std::str::from_utf8(cell).ok().and_then(|text| number(text, self.delimiter));
         if let Some(number) = parsed {
             let scaled = if feed.scale == 1.0 { number } else { number * feed.scale };
             if scaled.is_finite() {
@@ -216,6 +213,12 @@ impl<'a> Rows<'a> {
 }
 
 const INVALID: &str = "Leave out the rows where a value is missing or invalid; a gap in time splits the episode";
+
+/// The number that a cell's text is. Where commas do not part cells, one in a number is its decimal mark.
+pub(crate) fn number(text: &str, delimiter: u8) -> Option<f64> {
+    let comma = || text.replace(',', ".").parse().ok().filter(|_| delimiter != b',');
+    text.parse().ok().or_else(comma)
+}
 
 /// Whether a log is of use without this channel. A known disturbance that is left out would be taken for a gap.
 fn can_be_left_out(channel: Channel) -> bool {

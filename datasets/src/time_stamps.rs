@@ -18,7 +18,7 @@ const JITTER: f64 = 0.05;
 
 /// Splits a table at its gaps. Returns the parts that are long enough and what there is to say about the file's time.
 pub(crate) fn split(table: Table, name: &str) -> (Vec<Episode>, Vec<String>) {
-    let Table { episode, rows, mut notes, .. } = table;
+    let Table { mut episode, rows, mut notes, .. } = table;
     let steps: Vec<f64> = episode.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let dt = median(&mut steps.clone()).unwrap_or(0.0);
     let is_gap = |step: f64| step > GAP_STEPS * dt && step > GAP_SECONDS;
@@ -32,6 +32,9 @@ pub(crate) fn split(table: Table, name: &str) -> (Vec<Episode>, Vec<String>) {
         let (from, to) = (bound[0], bound[1]);
         if to - from < SHORTEST {
             short.push((from, to));
+        } else if gaps.is_empty() {
+            // A run may be long: it is moved, not copied.
+            parts.push(Episode { name: name.to_owned(), ..std::mem::take(&mut episode) });
         } else {
             let part = if parts.is_empty() { name.to_owned() } else { format!("{name}#{}", parts.len() + 1) };
             parts.push(episode.part(from, to, part));

@@ -142,7 +142,7 @@ pub struct Diagnose {
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
 pub struct Inspect {
-    /// Logs, as `diagnose` reads them; without --model only CSV
+    /// Logs, as `diagnose` reads them
     #[arg(required = true)]
     pub logs: Vec<PathBuf>,
     /// Robot description to hold the logs against: URDF, xacro or MJCF
@@ -163,6 +163,9 @@ pub struct Inspect {
     /// Hold a joint of the robot fixed at zero; may be given several times
     #[arg(long = "lock", value_name = "JOINT")]
     pub lock: Vec<String>,
+    /// Write a column map for the first log from what its columns look like, and nothing else
+    #[arg(long, value_name = "FILE", requires = "model", conflicts_with = "json")]
+    pub suggest_map: Option<PathBuf>,
     /// Print one JSON object and nothing else
     #[arg(long)]
     pub json: bool,

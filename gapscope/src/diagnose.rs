@@ -6,6 +6,7 @@ use crate::report::Setting;
 use crate::report::terminal::Paint;
 use crate::{output, report, servo, summary};
 use anyhow::{Context, Result};
+use gapscope_datasets::Bound;
 use gapscope_diagnosis::schema::Evidence;
 use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, Progress as Told, diagnose};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -50,7 +51,7 @@ pub enum Found {
 /// Bad input.
 pub fn found(args: &Diagnose, progress: Told<'_>) -> Result<Found> {
     progress("reading robot and logs", 0.0);
-    let loaded = load_any(&args.input)?;
+    let loaded = load_any(&args.input, Some(Bound::DIAGNOSIS), &|word| progress(word, 0.0))?;
     if servo::lacks_effort(&loaded) {
         return Ok(Found::Servo(Box::new(servo::diagnosed(args, loaded, progress)?)));
     }

@@ -4,6 +4,7 @@ use crate::cli::Evaluate;
 use crate::input::{load_any, strangeness, warn};
 use crate::{output, servo, summary};
 use anyhow::{Context, Result, bail};
+use gapscope_datasets::Bound;
 use gapscope_diagnosis::{Corrected, Predictions, evaluate};
 use gapscope_dynamics::Model;
 use std::fmt::Write;
@@ -44,7 +45,9 @@ pub struct Evaluated {
 /// # Errors
 /// Bad input, or a corrected model that cannot be read or is that of another robot.
 pub fn evaluated(args: &Evaluate) -> Result<Evaluated> {
-    let mut loaded = load_any(&args.input)?;
+    // A table of predictions has all that the logs hold.
+    let bound = args.predictions.is_none().then_some(Bound::DIAGNOSIS);
+    let mut loaded = load_any(&args.input, bound, &|_| {})?;
     let wanted = |table: &dyn Fn() -> String| args.predictions.as_ref().map_or_else(String::new, |_| table());
     if servo::lacks_effort(&loaded) {
         let (evaluation, paths) = servo::evaluated(args, &loaded)?;

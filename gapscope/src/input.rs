@@ -5,8 +5,8 @@ use crate::robot::{self, Description};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use gapscope_datasets::{
-    Calibration, ColumnMap, Doubt, Episode, Fault, Faults, LONGEST_STEP, LogError, ReadOptions, check_logs, digest,
-    find_faults, mend, read_arrays, read_logs,
+    ALL_LOGS, Bound, Calibration, ColumnMap, Doubt, Episode, Fault, LONGEST_STEP, LogError, LogErrorKind, ReadOptions,
+    check_logs, digest, find_faults, mend, read_arrays, read_logs_telling,
 };
 use gapscope_diagnosis::Origin;
 use gapscope_dynamics::{Finding, Model};
@@ -57,10 +57,15 @@ impl Loaded {
         faults.chain(self.doubts.iter().map(|doubt| format!("In doubt: {}", doubt.question))).collect()
     }
 
-    /// What is wrong with the logs and what was odd, in lines free of control characters.
+    /// What is wrong with the logs and what was odd, in lines.
+    pub fn said(&self) -> Vec<String> {
+        self.warnings().into_iter().chain(self.findings.iter().cloned()).collect()
+    }
+
+    /// The same, free of control characters.
     pub fn notes(&self) -> Vec<String> {
         let clean = |line: &String| line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-        self.warnings().iter().chain(&self.findings).map(clean).collect()
+        self.said().iter().map(clean).collect()
     }
 
     /// Says on standard error what is wrong with the logs, for commands that have no place for it in their answer.
@@ -96,25 +101,26 @@ pub fn fault_line(fault: &Fault) -> String {
 /// # Errors
 /// A file that cannot be read or that breaks a rule; the text names file, place and mend.
 pub fn load(input: &Input) -> Result<Loaded> {
-    load_with(input, options(input)?)
+    load_with(input, &options(input)?, &|_| {})
 }
 
-/// As [`load`], of logs that may hold a set point, current or voltage in the place of the effort.
+/// As [`load`], of logs that may hold a set point, current or voltage in the place of the effort, and within a bound. `tell`
+/// gets a word on how far the reading is.
 ///
 /// # Errors
 /// As those of [`load`].
-pub fn load_any(input: &Input) -> Result<Loaded> {
-    load_with(input, ReadOptions { without_effort: true, ..options(input)? })
+pub fn load_any(input: &Input, bound: Option<Bound>, tell: &(dyn Fn(&str) + Sync)) -> Result<Loaded> {
+    load_with(input, &ReadOptions { without_effort: true, bound, ..options(input)? }, tell)
 }
 
-fn load_with(input: &Input, options: ReadOptions) -> Result<Loaded> {
+fn load_with(input: &Input, options: &ReadOptions, tell: &(dyn Fn(&str) + Sync)) -> Result<Loaded> {
     let description = robot::read(&input.robot, &input.reading.xacro_args)?;
     let mut locked = input.reading.lock.clone();
     let mut said = Vec::new();
     loop {
         let robot = description.model(&input.robot, &locked)?;
         let joints: Vec<String> = robot.model.joints().iter().map(|j| j.name.clone()).collect();
-        let (episodes, notes) = match read(input, &joints, &options) {
+        let (episodes, notes) = match read(input, &joints, options, tell) {
             // Each round holds joints more, so that it ends.
             Err(error) if !error.absent.is_empty() => {
                 let message = "the logs say nothing of it: held still at position zero";
@@ -122,12 +128,31 @@ fn load_with(input: &Input, options: ReadOptions) -> Result<Loaded> {
                 locked.extend(error.absent);
                 continue;
             }
-            read => read?,
+            Err(error) => return Err(pointed(error, input)),
+            Ok(read) => read,
         };
         said.extend(notes);
         said.extend(robot.findings);
         return checked(input, (description, locked), robot.model, episodes, said);
     }
+}
+
+/// The error, with the way to a map where one may be what lacks.
+fn pointed(error: LogError, input: &Input) -> anyhow::Error {
+    let by_names =
+        matches!(error.kind, LogErrorKind::MissingColumn | LogErrorKind::MissingJoint | LogErrorKind::UnknownJoint);
+    let mapped = input.reading.map_file.is_some() || !input.reading.map.is_empty();
+    if !by_names || mapped || !input.arrays.is_empty() {
+        return error.into();
+    }
+    // A file may be a part of a log, which is a folder.
+    let log = input.logs.iter().find(|log| error.file.starts_with(&*log.display().to_string()));
+    let Some(log) = log else { return error.into() };
+    anyhow::anyhow!(
+        "{error}. If names are what is in the way, this writes a map: gapscope inspect {} --model {} --suggest-map map.toml",
+        log.display(),
+        input.robot.display()
+    )
 }
 
 /// The logs, from files or from memory.
@@ -138,9 +163,10 @@ pub(crate) fn read(
     input: &Input,
     joints: &[String],
     options: &ReadOptions,
+    tell: &(dyn Fn(&str) + Sync),
 ) -> Result<(Vec<Episode>, Vec<Finding>), LogError> {
     match input.arrays.as_slice() {
-        [] => read_logs(&input.logs, joints, options),
+        [] => read_logs_telling(&input.logs, joints, options, tell),
         arrays => read_arrays(arrays, joints, options),
     }
 }
@@ -153,9 +179,7 @@ fn checked(
     episodes: Vec<Episode>,
     said: Vec<Finding>,
 ) -> Result<Loaded> {
-    // What is told by the torque that the robot takes has nothing to hold it against without one.
-    let told = episodes.iter().all(Episode::has_effort);
-    let mut found = if told { find_faults(&model, &episodes) } else { Faults::default() };
+    let mut found = find_faults(&model, &episodes);
     let (model, episodes) = if input.as_logged {
         found.faults.iter_mut().for_each(|fault| fault.mended = false);
         (model, episodes)
@@ -176,9 +200,11 @@ fn checked(
     if let Some(first) = said.first().filter(|_| episodes.is_empty() && !slow.is_empty()) {
         bail!("{first}");
     }
-    // What is held against the model weighs most, what the reader of the robot passed over least.
+    // What part of the logs was read comes first. Then what is held against the model weighs most, what the reader of the robot
+    // passed over least.
     let checks = check_logs(&model, &episodes);
-    let findings = checks.iter().chain(&said).map(ToString::to_string).collect();
+    let (of_all, said): (Vec<Finding>, Vec<Finding>) = said.into_iter().partition(|finding| finding.about == ALL_LOGS);
+    let findings = of_all.iter().chain(&checks).chain(&said).map(ToString::to_string).collect();
     Ok(Loaded {
         model,
         episodes,
@@ -211,6 +237,7 @@ pub fn options(input: &Input) -> Result<ReadOptions> {
         // A hole in a channel that nothing here needs is worth a finding, not the log.
         drop_bad_channels: true,
         without_effort: false,
+        bound: None,
     })
 }
 

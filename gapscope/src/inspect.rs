@@ -1,14 +1,18 @@
 //! `gapscope inspect`: what logs are like, what is wrong with them, and what they determine.
 
 use crate::cli::{Input, Inspect};
-use crate::input::{Reading, fault_line, load, options, read};
+use crate::input::{Reading, fault_line, load_any, options, read};
 use crate::report::terminal::{column, fill, pad};
 use crate::report::{count, figure, percent, plain};
-use anyhow::{Context, Result};
-use gapscope_datasets::{Doubt, Fault, LogTraits, determined, inspect, joints_of};
+use crate::{output, robot};
+use anyhow::{Context, Result, bail};
+use gapscope_datasets::{
+    Bound, Doubt, Episode, Fault, LogTraits, ReadOptions, determined, inspect, joints_of, suggest_map,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::path::Path;
 
 /// What `--json` prints, schema `gapscope.inspection/1`.
 #[derive(Debug, Serialize)]
@@ -45,8 +49,35 @@ pub fn run(args: &Inspect) -> Result<String> {
         episodes: args.episodes.clone(),
         ..Input::default()
     };
+    if let Some(file) = &args.suggest_map {
+        return suggest(&input, file);
+    }
     let inspection = inspected(&input)?;
     Ok(if args.json { serde_json::to_string(&inspection)? } else { text(&inspection) })
+}
+
+/// Writes a column map for the first log; what to say of it.
+fn suggest(input: &Input, file: &Path) -> Result<String> {
+    if file.exists() {
+        bail!("{} exists already; choose another name, or remove it", file.display());
+    }
+    let log = input.logs.first().context("no log is given")?;
+    let model = robot::read(&input.robot, &[])?.model(&input.robot, &input.reading.lock)?.model;
+    let map = suggest_map(log, &model, &options(input)?)?;
+    output::write(file, &map.text)?;
+    let mut text = format!("{}\n{} holds this map.", map.text, file.display());
+    if map.open.is_empty() {
+        let _ = write!(
+            text,
+            " The log is read with it: gapscope diagnose {} {} --map-file {}",
+            input.robot.display(),
+            log.display(),
+            file.display()
+        );
+    } else {
+        let _ = write!(text, " It does not do yet; complete it by hand. {}", map.open.join(". "));
+    }
+    Ok(text.chars().map(|c| if c.is_control() && c != '\n' { ' ' } else { c }).collect())
 }
 
 /// What the logs are like; without a robot where its path is empty.
@@ -56,21 +87,28 @@ pub fn run(args: &Inspect) -> Result<String> {
 pub fn inspected(input: &Input) -> Result<Inspection> {
     let schema = "gapscope.inspection/1";
     if input.robot.as_os_str().is_empty() {
+        let options = ReadOptions { without_effort: true, ..options(input)? };
         let joints = match input.arrays.first() {
             Some(first) => first.joints(),
-            None => joints_of(input.logs.first().context("no log is given")?)?,
+            None => joints_of(input.logs.first().context("no log is given")?, &options)?,
         };
-        let (episodes, notes) = read(input, &joints, &options(input)?)?;
+        let (episodes, notes) = read(input, &joints, &options, &|_| {})?;
         let findings = notes.iter().map(ToString::to_string).collect();
         let logs = inspect(&episodes);
         return Ok(Inspection { schema, logs, faults: vec![], doubts: vec![], findings, determined: BTreeMap::new() });
     }
-    let loaded = load(input)?;
+    let loaded = load_any(input, Some(Bound::DIAGNOSIS), &|_| {})?;
     let names = loaded.model.joints().iter().map(|joint| joint.name.clone());
+    // Parameters are told by the torque that the motion takes.
+    let told = if loaded.episodes.iter().all(Episode::has_effort) {
+        names.zip(determined(&loaded.model, &loaded.episodes)).collect()
+    } else {
+        BTreeMap::new()
+    };
     Ok(Inspection {
         schema,
         logs: inspect(&loaded.episodes),
-        determined: names.zip(determined(&loaded.model, &loaded.episodes)).collect(),
+        determined: told,
         faults: loaded.faults,
         doubts: loaded.doubts,
         findings: loaded.findings,
@@ -106,17 +144,18 @@ pub fn text(inspection: &Inspection) -> String {
             let step = joint.step.map_or(String::new(), |step| format!(", encoder step {}", figure(step)));
             let still = if joint.moves { "" } else { ", stands still" };
             let glitches = if joint.glitches > 0 { format!(", {} jumps", joint.glitches) } else { String::new() };
+            let effort = joint.effort.map_or(String::new(), |[low, high]| {
+                let held = percent(joint.effort_held.unwrap_or_default());
+                format!("; effort {} to {}, held {held}", figure(low), figure(high))
+            });
             let _ = writeln!(
                 text,
-                "  {}  position {} to {}, speed {} rms, noise {}{step}{glitches}{still}; effort {} to {}, held {}",
+                "  {}  position {} to {}, speed {} rms, noise {}{step}{glitches}{still}{effort}",
                 pad(&joint.name, width),
                 fill(&figure(joint.position[0]), 7),
                 fill(&figure(joint.position[1]), 7),
                 figure(joint.speed),
                 figure(joint.noise),
-                figure(joint.effort[0]),
-                figure(joint.effort[1]),
-                percent(joint.effort_held)
             );
         }
     }

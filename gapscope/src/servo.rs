@@ -31,7 +31,7 @@ fn given(file: Option<&Path>, loaded: &Loaded) -> Result<Given> {
 /// A `--drive` file that cannot be read.
 pub fn diagnosed(args: &Diagnose, loaded: Loaded, progress: &(dyn Fn(&str, f64) + Sync)) -> Result<Outcome> {
     let given = given(args.drive.as_deref(), &loaded)?;
-    Ok(gapscope_servo::diagnose(&loaded.model, &loaded.episodes, &given, loaded.findings, progress)?)
+    Ok(gapscope_servo::diagnose(&loaded.model, &loaded.episodes, &given, loaded.said(), progress)?)
 }
 
 /// The files of its results.

@@ -69,7 +69,7 @@ fn case_of(episode: usize, joint: usize, value: f64) -> Case {
 }
 
 /// How far a range passes the limits of a joint when it is multiplied by `scale`; 0 within, and for joints without limits.
-pub(super) fn excess(logs: &Logs, joint: usize, scale: f64, low: f64, high: f64) -> f64 {
+pub(crate) fn excess(logs: &Logs, joint: usize, scale: f64, low: f64, high: f64) -> f64 {
     let joint = &logs.model.joints()[joint];
     if joint.kind == gapscope_dynamics::JointKind::Continuous {
         return 0.0;

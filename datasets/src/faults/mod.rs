@@ -10,6 +10,7 @@ mod decide;
 mod determined;
 mod effort;
 mod gravity;
+mod limits;
 mod motion;
 mod odd;
 mod order;
@@ -153,8 +154,12 @@ impl Fault {
 /// Looks for faults in logs. All logs are taken to have the same ones, but for a log that is not like the others.
 ///
 /// At most some hundred places of all logs are held against the model, so that the cost is that of reading the logs once or
-/// twice. Episodes whose joints are not those of the model, by count, are passed over.
+/// twice. Episodes whose joints are not those of the model, by count, are passed over. Where some log lacks the effort,
+/// there is no torque to hold the model against, and the robot's limits alone tell degrees.
 pub fn find_faults(model: &Model, episodes: &[Episode]) -> Faults {
+    if episodes.iter().any(|episode| !episode.has_effort()) {
+        return limits::search(model, &episodes.iter().collect::<Vec<_>>());
+    }
     search::search(model, &episodes.iter().collect::<Vec<_>>())
 }
 

@@ -1,9 +1,8 @@
 //! HDF5 in the layout of ALOHA: `/observations/qpos`, `qvel`, `effort` and `/action`, or arrays of other usual names.
 
-use super::{LogReader, Request};
+use super::{Each, LogReader, Request, Run};
 use crate::arrays::{self, Array, MOST_NUMBERS};
 use crate::error::{LogError, LogErrorKind};
-use crate::table::Table;
 use hdf5_reader::group::Group;
 use hdf5_reader::{Dataset, Datatype, Hdf5File, OpenOptions};
 use std::path::PathBuf;
@@ -17,7 +16,7 @@ const DEEPEST: usize = 4;
 const ALOHA: f64 = 50.0;
 
 impl LogReader for Hdf5 {
-    fn runs(&self, request: &Request, each: &mut dyn FnMut(Table)) -> Result<(), LogError> {
+    fn runs(&self, request: &Request, each: Each) -> Result<(), LogError> {
         let options =
             OpenOptions::default().with_max_read_bytes(8 * MOST_NUMBERS as usize).with_chunk_cache_bytes(16 << 20);
         let file = Hdf5File::open_with_options(&self.0, options).map_err(|error| damaged(&error))?;
@@ -25,8 +24,7 @@ impl LogReader for Hdf5 {
         let root = file.root_group().map_err(|error| damaged(&error))?;
         gather(&root, "", 0, &mut held)?;
         let aloha = held.iter().any(|array| array.name == "observations.qpos");
-        each(arrays::recording(&held, aloha.then_some(ALOHA), request)?.table(request)?);
-        Ok(())
+        each(Run::Columns(arrays::recording(held, aloha.then_some(ALOHA), request)?))
     }
 }
 

@@ -1,9 +1,8 @@
 //! MATLAB `.mat` files of version 5 to 7 (MAT-File Format, MathWorks 2019, "Level 5").
 
-use super::{LogReader, Request, file};
+use super::{Each, LogReader, Request, Run, file};
 use crate::arrays::{self, Array, MOST_NUMBERS};
 use crate::error::{LogError, LogErrorKind};
-use crate::table::Table;
 use flate2::read::ZlibDecoder;
 use std::io::Read;
 use std::path::PathBuf;
@@ -15,10 +14,8 @@ pub(super) struct Matlab(pub PathBuf);
 const DEEPEST: usize = 8;
 
 impl LogReader for Matlab {
-    fn runs(&self, request: &Request, each: &mut dyn FnMut(Table)) -> Result<(), LogError> {
-        let held = variables(&file(&self.0)?)?;
-        each(arrays::recording(&held, None, request)?.table(request)?);
-        Ok(())
+    fn runs(&self, request: &Request, each: Each) -> Result<(), LogError> {
+        each(Run::Columns(arrays::recording(variables(&file(&self.0)?)?, None, request)?))
     }
 }
 

@@ -1,10 +1,9 @@
 //! MCAP with ROS 2 messages (mcap.dev/spec, version 0), chunk by chunk.
 
-use super::{LogReader, Request};
+use super::{Each, LogReader, Request, Run};
 use crate::error::{LogError, LogErrorKind};
 use crate::ros::Topics;
 use crate::rows::ALLOW;
-use crate::table::Table;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -19,13 +18,12 @@ const MOST_BYTES: u64 = 1 << 30;
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
 impl LogReader for Mcap {
-    fn runs(&self, request: &Request, each: &mut dyn FnMut(Table)) -> Result<(), LogError> {
+    fn runs(&self, request: &Request, each: Each) -> Result<(), LogError> {
         let mut topics = Topics::default();
         let notes = read(&self.0, request, &mut topics)?;
         let mut recording = topics.recording(request)?;
         recording.notes.extend(notes);
-        each(recording.table(request)?);
-        Ok(())
+        each(Run::Columns(recording))
     }
 }
 

@@ -16,6 +16,7 @@ mod zip;
 use crate::container;
 use crate::error::{LogError, LogErrorKind};
 use crate::options::ReadOptions;
+use crate::recording::Recording;
 use crate::table::Table;
 use std::io::Read;
 use std::path::Path;
@@ -26,13 +27,43 @@ pub(crate) struct Request<'a> {
     pub joints: &'a [String],
     /// How to read.
     pub options: &'a ReadOptions,
+    /// Only look: columns keep the names that they have in the file, and nothing is required of them.
+    pub look: bool,
 }
+
+impl Request<'_> {
+    /// Whether columns are asked for under the names that they have in the file.
+    pub fn by_own_names(&self) -> bool {
+        self.look || !self.options.map.is_empty()
+    }
+}
+
+/// A run as its container gives it.
+pub(crate) enum Run {
+    /// Columns that are still to be matched with the robot's joints.
+    Columns(Recording),
+    /// Rows of a text, which are matched as they are read.
+    Rows(Box<Table>),
+}
+
+impl Run {
+    /// The run, its columns matched with the robot's joints and checked. Errors do not carry the file's name yet.
+    pub fn table(self, request: &Request) -> Result<Table, LogError> {
+        match self {
+            Run::Columns(recording) => recording.table(request),
+            Run::Rows(table) => Ok(*table),
+        }
+    }
+}
+
+/// Takes over one run.
+pub(crate) type Each<'a> = &'a mut dyn FnMut(Run) -> Result<(), LogError>;
 
 /// A log file, or a folder that is one log, opened.
 pub(crate) trait LogReader {
     /// Passes the runs of the file to `each`, in their order and one at a time, so that one is in memory at a time.
     /// Errors do not carry the file's name yet.
-    fn runs(&self, request: &Request, each: &mut dyn FnMut(Table)) -> Result<(), LogError>;
+    fn runs(&self, request: &Request, each: Each) -> Result<(), LogError>;
 }
 
 /// Most bytes of a file that is read whole.
@@ -74,6 +105,30 @@ pub(crate) fn open(path: &Path) -> Result<Box<dyn LogReader>, LogError> {
         () if starts(b"\x89HDF\r\n\x1a\n") => hdf5_file(path)?,
         () => Box::new(text::Text(container::read(path)?)),
     })
+}
+
+/// The first run of what lies at `path`, before its columns are matched with the joints of a robot; with `by_own_names`
+/// under the names that they have in the file.
+pub(crate) fn look(path: &Path, options: &ReadOptions, by_own_names: bool) -> Result<Recording, LogError> {
+    let request = Request { joints: &[], options, look: by_own_names };
+    let mut seen = None;
+    let enough = || LogError::new(LogErrorKind::Empty, "the file holds no run").hint("Check whether the logger ran");
+    let mut first = |run: Run| {
+        if let Run::Columns(recording) = run {
+            seen = Some(recording);
+        }
+        // Nothing is read beyond the first run.
+        Err(enough())
+    };
+    let read = open(path).and_then(|reader| reader.runs(&request, &mut first));
+    let in_file = |error: LogError| {
+        if error.file.is_empty() { error.file(path.display().to_string()) } else { error }
+    };
+    match (seen, read) {
+        (Some(recording), _) => Ok(recording),
+        (None, Err(error)) => Err(in_file(error)),
+        (None, Ok(())) => Err(in_file(enough())),
+    }
 }
 
 #[cfg(feature = "parquet")]

@@ -3,12 +3,11 @@
 //! Form: numpy.lib.format, versions 1 to 3.
 
 use super::zip;
-use super::{LogReader, Request, file};
+use super::{Each, LogReader, Request, Run, file};
 use crate::arrays::{self, Array, MOST_NUMBERS};
 use crate::error::{LogError, LogErrorKind};
 use crate::joint_names::UNNAMED;
 use crate::recording::Recording;
-use crate::table::Table;
 use std::path::PathBuf;
 
 /// Arrays by name in a zip archive: `time [T]`, `position [T, n]`, `effort [T, n]`, …; `joint_names [n]` where known.
@@ -18,7 +17,7 @@ pub(super) struct Npz(pub PathBuf);
 pub(super) struct Npy(pub PathBuf);
 
 impl LogReader for Npz {
-    fn runs(&self, request: &Request, each: &mut dyn FnMut(Table)) -> Result<(), LogError> {
+    fn runs(&self, request: &Request, each: Each) -> Result<(), LogError> {
         let bytes = file(&self.0)?;
         let mut held = Vec::new();
         let mut notes = Vec::new();
@@ -38,16 +37,15 @@ impl LogReader for Npz {
             )
             .hint("Write it with numpy.savez(\"run.npz\", time=…, position=…, effort=…)"));
         }
-        let mut recording = arrays::recording(&held, None, request)?;
-        drop((held, bytes));
+        drop(bytes);
+        let mut recording = arrays::recording(held, None, request)?;
         recording.notes.extend(notes);
-        each(recording.table(request)?);
-        Ok(())
+        each(Run::Columns(recording))
     }
 }
 
 impl LogReader for Npy {
-    fn runs(&self, request: &Request, each: &mut dyn FnMut(Table)) -> Result<(), LogError> {
+    fn runs(&self, request: &Request, each: Each) -> Result<(), LogError> {
         let table = match array("table", &file(&self.0)?) {
             Ok(table) => table,
             Err(Refused::Error(error)) => return Err(error),
@@ -58,9 +56,16 @@ impl LogReader for Npy {
         };
         let n = request.joints.len();
         let width = table.shape.get(1).copied().unwrap_or(0);
+        let column = |at: usize| table.values.iter().skip(at).step_by(width.max(1)).copied().collect();
+        let mut recording = Recording::default();
+        let by_own_names = request.by_own_names() && table.shape.len() == 2;
+        if by_own_names {
+            (0..width).for_each(|at| recording.add(format!("table[{at}]"), column(at)));
+        }
         let channels: &[&str] = match (table.shape.len(), width) {
             (2, width) if width == 1 + 2 * n => &["position", "effort"],
             (2, width) if width == 1 + 3 * n => &["position", "velocity", "effort"],
+            _ if by_own_names => return each(Run::Columns(recording)),
             _ => {
                 return Err(LogError::new(
                     LogErrorKind::MissingColumn,
@@ -73,8 +78,6 @@ impl LogReader for Npy {
                 )));
             }
         };
-        let column = |at: usize| table.values.iter().skip(at).step_by(width).copied().collect();
-        let mut recording = Recording::default();
         recording.notes.push(format!(
             "the array has no names: read as time, {} of the joints in the robot's order",
             channels.join(", ")
@@ -85,8 +88,7 @@ impl LogReader for Npy {
                 recording.add(format!("{channel}.{UNNAMED}{}", joint + 1), column(1 + block * n + joint));
             }
         }
-        each(recording.table(request)?);
-        Ok(())
+        each(Run::Columns(recording))
     }
 }
 

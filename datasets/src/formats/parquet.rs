@@ -1,9 +1,8 @@
 //! Parquet with a column for each quantity, or with lists of one number a joint.
 
-use super::{LogReader, Request};
+use super::{Each, LogReader, Request, Run};
 use crate::arrays::{self, Array, MOST_NUMBERS};
 use crate::error::{LogError, LogErrorKind};
-use crate::table::Table;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
@@ -15,7 +14,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct Parquet(pub PathBuf);
 
 impl LogReader for Parquet {
-    fn runs(&self, request: &Request, each: &mut dyn FnMut(Table)) -> Result<(), LogError> {
+    fn runs(&self, request: &Request, each: Each) -> Result<(), LogError> {
         let file = open(&self.0)?;
         let mut whole: Vec<Array> = Vec::new();
         for group in 0..file.num_row_groups() {
@@ -26,8 +25,7 @@ impl LogReader for Parquet {
                 }
             }
         }
-        each(arrays::columns_or_whole(whole, request)?.table(request)?);
-        Ok(())
+        each(Run::Columns(arrays::columns_or_whole(whole, request)?))
     }
 }
 

@@ -1,16 +1,15 @@
 //! Bags of ROS 2 as `ros2 bag record` leaves them: a folder with `metadata.yaml` and parts, or one SQLite file.
 
-use super::{LogReader, Request, mcap};
+use super::{Each, LogReader, Request, Run, mcap};
 use crate::error::{LogError, LogErrorKind};
 use crate::ros::Topics;
-use crate::table::Table;
 use std::path::{Path, PathBuf};
 
 /// A folder, or a SQLite file.
 pub(super) struct Bag(pub PathBuf);
 
 impl LogReader for Bag {
-    fn runs(&self, request: &Request, each: &mut dyn FnMut(Table)) -> Result<(), LogError> {
+    fn runs(&self, request: &Request, each: Each) -> Result<(), LogError> {
         let parts = if self.0.is_dir() { parts(&self.0)? } else { vec![self.0.clone()] };
         let mut topics = Topics::default();
         let mut notes = Vec::new();
@@ -29,8 +28,7 @@ impl LogReader for Bag {
         }
         let mut recording = topics.recording(request)?;
         recording.notes.extend(notes);
-        each(recording.table(request)?);
-        Ok(())
+        each(Run::Columns(recording))
     }
 }
 

@@ -1,17 +1,19 @@
 //! CSV, plain or gzipped.
 
-use super::{LogReader, Request};
+use super::{Each, LogReader, Request, Run};
 use crate::container::Contents;
 use crate::csv;
 use crate::error::LogError;
-use crate::table::Table;
 
 /// A CSV file: one run.
 pub(super) struct Text(pub Contents);
 
 impl LogReader for Text {
-    fn runs(&self, request: &Request, each: &mut dyn FnMut(Table)) -> Result<(), LogError> {
-        each(csv::parse(&self.0, request.joints, request.options)?);
-        Ok(())
+    fn runs(&self, request: &Request, each: Each) -> Result<(), LogError> {
+        each(if request.look {
+            Run::Columns(csv::columns(&self.0)?)
+        } else {
+            Run::Rows(Box::new(csv::parse(&self.0, request.joints, request.options)?))
+        })
     }
 }

@@ -78,9 +78,10 @@ impl Member<'_> {
             0 => Ok(self.packed.to_vec()),
             8 => {
                 let mut out = Vec::new();
-                DeflateDecoder::new(self.packed).take(most + 1).read_to_end(&mut out).map_err(|_| damaged())?;
-                if out.len() as u64 > most {
-                    return Err(too_large(&self.name, out.len() as u64));
+                // What says that it is small and is not fills no memory either.
+                DeflateDecoder::new(self.packed).take(self.size + 1).read_to_end(&mut out).map_err(|_| damaged())?;
+                if out.len() as u64 != self.size {
+                    return Err(damaged());
                 }
                 Ok(out)
             }

@@ -133,7 +133,7 @@ impl Topics {
             return Err(self.nothing("the topics do not overlap in time"));
         }
         let origin = kept[0].0;
-        recording.add("time", kept.iter().map(|(time, _)| time.saturating_sub(origin) as f64 * 1e-9).collect());
+        recording.add("time", kept.iter().map(|(time, _)| time.saturating_sub(origin) as f64 / 1e9).collect());
         for channel in first.channels() {
             for (name, column) in first.names.iter().zip(first.columns(channel).unwrap_or_default()) {
                 add(&mut recording, channel, name, kept.iter().map(|(_, at)| column[*at]).collect());
@@ -257,7 +257,7 @@ impl Topics {
 
 /// How many joints of the robot a group names; all that it names count where a map says which is which.
 fn matched(group: &Group, request: &Request) -> usize {
-    if request.options.map.is_empty() { joint_names::count(&group.names, request.joints) } else { group.names.len() }
+    if request.by_own_names() { group.names.len() } else { joint_names::count(&group.names, request.joints) }
 }
 
 /// Adds a column, unless it holds nothing.

@@ -226,3 +226,88 @@ fn folders_that_are_no_log() {
         }
     }
 }
+
+/// The error that a file of `tests/formats/broken`, or another of these, gets.
+fn broken(name: &str) -> gapscope_datasets::LogError {
+    let options = ReadOptions { without_effort: true, ..ReadOptions::default() };
+    read_logs(&[path(name)], &joints(), &options).expect_err(name)
+}
+
+#[test]
+fn files_that_their_tools_wrote_and_that_hold_no_run() {
+    let cases = [
+        ("broken/objects.npz", LogErrorKind::UnknownContainer, "no NumPy array of numbers"),
+        ("broken/lengths.npz", LogErrorKind::MissingColumn, "no array holds the position"),
+        ("broken/no_time.npz", LogErrorKind::MissingColumn, "no array holds the time"),
+        ("broken/rate.npz", LogErrorKind::MissingColumn, "the sampling rate is 0 Hz"),
+        ("broken/empty.npz", LogErrorKind::Empty, "not one sample"),
+        ("broken/records.npy", LogErrorKind::UnknownContainer, "records with fields"),
+        ("broken/strings.mat", LogErrorKind::MissingColumn, "the file holds note"),
+        ("broken/twice.mcap", LogErrorKind::DoubledColumn, "names a joint twice"),
+        ("broken/others.mcap", LogErrorKind::MissingColumn, "/joint_states names a, b"),
+        ("broken/short.mcap", LogErrorKind::MissingColumn, "names no joint"),
+        ("two_robots.mcap", LogErrorKind::DoubledColumn, "--topic"),
+        ("ros1.bag", LogErrorKind::UnknownContainer, "rosbags-convert"),
+    ];
+    let parquet = [
+        ("broken/ragged.parquet", LogErrorKind::RaggedRow, "row"),
+        ("broken/nan.parquet", LogErrorKind::NotFinite, "sample 8"),
+        ("broken/texts.parquet", LogErrorKind::MissingColumn, "no array"),
+        ("broken/no_drive", LogErrorKind::MissingColumn, "what drives the joints"),
+        ("broken/no_episodes", LogErrorKind::Empty, "no episode of the dataset"),
+        ("broken/widths", LogErrorKind::RaggedRow, "meta/info.json says 3"),
+    ];
+    let hdf5 = [("broken/nothing.hdf5", LogErrorKind::MissingColumn, "the file holds")];
+    let sqlite = [("broken/schema.db3", LogErrorKind::CannotRead, "no such column")];
+    let chosen = cases
+        .iter()
+        .chain(parquet.iter().filter(|_| cfg!(feature = "parquet")))
+        .chain(hdf5.iter().filter(|_| cfg!(feature = "hdf5")))
+        .chain(sqlite.iter().filter(|_| cfg!(feature = "rosbag-sqlite")));
+    for (name, kind, what) in chosen {
+        let error = broken(name);
+        let line = error.to_string();
+        let file = name.split('/').next_back().unwrap();
+        assert!(error.kind == *kind && line.contains(what) && line.contains(file), "{name}: {kind:?} {what}: {line}");
+        assert!(!error.hint.is_empty(), "{name} lacks a mend: {line}");
+    }
+}
+
+/// The bytes of an archive whose directory says that its first member unpacks to so many bytes.
+fn of_size(size: u32) -> Vec<u8> {
+    let mut bytes = std::fs::read(path("plain.npz")).unwrap();
+    let at = bytes.windows(4).position(|window| window == b"PK\x01\x02").unwrap() + 24;
+    bytes[at..at + 4].copy_from_slice(&size.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn what_unpacks_to_too_much_is_refused_before_it_does() {
+    refused(&of_size(u32::MAX - 1), LogErrorKind::CannotRead, "more than is read");
+    // One that says that it is small, and is not.
+    refused(&of_size(10), LogErrorKind::CannotRead, "damaged");
+    // The length of the first chunk when unpacked, and of the first record.
+    let bytes = std::fs::read(path("zstd.mcap")).unwrap();
+    let mut chunk = bytes.clone();
+    let at = bytes.windows(4).position(|window| window == b"zstd").unwrap();
+    chunk[at - 16..at - 8].copy_from_slice(&(1_u64 << 40).to_le_bytes());
+    refused(&chunk, LogErrorKind::CannotRead, "unpacks to 1099511627776 bytes");
+    let mut record = bytes;
+    record[9..17].copy_from_slice(&(1_u64 << 40).to_le_bytes());
+    refused(&record, LogErrorKind::CannotRead, "1099511627776 bytes long");
+}
+
+#[test]
+fn files_of_the_heavy_formats_that_end_early() {
+    for (name, feature, part) in [
+        ("flat.parquet", cfg!(feature = "parquet"), 0.6),
+        ("aloha.hdf5", cfg!(feature = "hdf5"), 0.3),
+        ("bag_sqlite/bag_sqlite.db3", cfg!(feature = "rosbag-sqlite"), 0.1),
+    ] {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), cut(name, part)).unwrap();
+        let error = read_logs(&[file.path()], &joints(), &ReadOptions::default()).unwrap_err();
+        let kind = if feature { LogErrorKind::CannotRead } else { LogErrorKind::UnknownContainer };
+        assert!(error.kind == kind && !error.hint.is_empty(), "{name}: {error}");
+    }
+}

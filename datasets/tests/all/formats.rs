@@ -240,3 +240,47 @@ fn joints_of_which_a_log_says_nothing_are_named() {
     let other = ["shoulder".to_owned(), "elbaw".to_owned()];
     assert!(read_logs(&[path("run.csv")], &other, &ReadOptions::default()).unwrap_err().absent.is_empty());
 }
+
+#[test]
+fn runs_without_torque_are_read_with_their_set_points() {
+    let options = ReadOptions { without_effort: true, ..ReadOptions::default() };
+    let truth = truth();
+    for (name, read) in [
+        ("set_points.mcap", true),
+        ("set_points.npz", true),
+        ("set_points.mat", true),
+        ("set_points.hdf5", cfg!(feature = "hdf5")),
+        ("set_points.parquet", cfg!(feature = "parquet")),
+    ] {
+        if !read {
+            continue;
+        }
+        let (episodes, _) = read_with(name, &options).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((&episodes[0].position, &episodes[0].command), (&truth.position, &truth.command), "{name}");
+        assert!(!episodes[0].has_effort(), "{name}");
+        refused(
+            name,
+            if name.ends_with("mcap") { LogErrorKind::MissingJoint } else { LogErrorKind::MissingColumn },
+            "effort",
+        );
+    }
+}
+
+#[test]
+fn a_dataset_without_torque_is_read_with_its_action_and_the_currents_of_its_motors() {
+    if !cfg!(feature = "parquet") {
+        return;
+    }
+    refused("lerobot_set_points", LogErrorKind::MissingColumn, "no feature holds the torque");
+    let options = ReadOptions { without_effort: true, ..ReadOptions::default() };
+    let (episodes, findings) = read_with("lerobot_set_points", &options).unwrap();
+    let near = |a: &[Vec<f64>], b: &[Vec<f64>], of: &dyn Fn(f64) -> f64| {
+        a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| (a - of(*b)).abs() < 1e-4)
+    };
+    let degrees = |x: f64| x.to_degrees() + 90.0;
+    assert!(near(&episodes[0].position, &truth().position, &degrees));
+    assert!(near(episodes[0].command.as_ref().unwrap(), truth().command.as_ref().unwrap(), &degrees));
+    assert!(near(episodes[0].current.as_ref().unwrap(), &truth().effort, &|x| x));
+    said(&findings, "motor_currents is read as the current");
+    said(&findings, "per cent");
+}

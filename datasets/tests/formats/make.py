@@ -5,9 +5,11 @@
     python make.py        (writes beside this script)
 """
 
+import gzip
 import json
 import pathlib
 import shutil
+import sqlite3
 
 import h5py
 import numpy as np
@@ -251,6 +253,132 @@ def lerobot():
                 pq.write_table(table, data / f"episode_{episode:06d}.parquet")
 
 
+def dataset(root, version, features, tables, robot_type="two_links"):
+    """A LeRobot folder whose features of numbers hold two joints each; `tables` is a list of episodes."""
+    shutil.rmtree(root, ignore_errors=True)
+    (root / "meta").mkdir(parents=True)
+    vector = {"dtype": "float32", "shape": [2], "names": [f"{joint}.pos" for joint in JOINTS]}
+    described = {name: vector for name in features} | {"timestamp": {"dtype": "float32", "shape": [1], "names": None}}
+    described |= {"episode_index": {"dtype": "int64", "shape": [1], "names": None}}
+    info = {"codebase_version": version, "robot_type": robot_type, "fps": 128, "features": described}
+    (root / "meta/info.json").write_text(json.dumps(info, indent=1) + "\n")
+    whole = []
+    for episode, table in enumerate(tables):
+        count = len(table[features[0]])
+        columns = {name: pa.array(list(table[name].astype(np.float32)), pa.list_(pa.float32(), 2)) for name in features}
+        columns |= {"timestamp": (np.arange(count) / 128).astype(np.float32), "episode_index": np.full(count, episode)}
+        whole.append(pa.table(columns))
+    (root / "data/chunk-000").mkdir(parents=True)
+    pq.write_table(pa.concat_tables(whole), root / "data/chunk-000/file-000.parquet", compression="gzip")
+
+
+def without_torque():
+    """The run without its torque: set points say what drives the joints."""
+    state, control = "sensor_msgs/msg/JointState", "control_msgs/msg/JointTrajectoryControllerState"
+    both = []
+    for k in range(COUNT):
+        both.append(("/joint_states", state, joint_state(k, effort=False), 1000))
+        message = {"header": header(k), "joint_names": JOINTS, "error": point(), "output": point(), "feedback": point()}
+        both.append(("/controller/state", control, message | {"reference": point(COMMAND[k])}, 1000))
+    mcap("set_points.mcap", both)
+    np.savez_compressed(HERE / "set_points.npz", time=TIME, qpos=POSITION, action=COMMAND, joint_names=JOINTS)
+    scipy.io.savemat(HERE / "set_points.mat", {"t": TIME, "q": POSITION, "qdes": COMMAND}, do_compression=True)
+    with h5py.File(HERE / "set_points.hdf5", "w") as file:
+        file.create_group("observations").create_dataset("qpos", data=POSITION)
+        file.create_dataset("action", data=COMMAND)
+    nested = {"timestamp": TIME, "q": list(POSITION), "command": list(COMMAND)}
+    pq.write_table(pa.table(nested), HERE / "set_points.parquet", compression="gzip")
+    degrees = {"observation.state": np.degrees(POSITION) + 90, "action": np.degrees(COMMAND) + 90}
+    degrees["observation.motor_currents"] = EFFORT
+    dataset(HERE / "lerobot_set_points", "v3.0", list(degrees), [degrees], "so101_follower")
+
+
+def broken():
+    """Files that their tools write and that hold no run."""
+    folder = HERE / "broken"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    ragged = [list(row)[: 1 + (k != 40)] for k, row in enumerate(POSITION)]
+    pq.write_table(pa.table({"time": TIME, "q": ragged, "tau": list(EFFORT)}), folder / "ragged.parquet")
+    holes = EFFORT.copy()
+    holes[7, 1] = np.nan
+    pq.write_table(pa.table({"time": TIME, "q": list(POSITION), "tau": list(holes)}), folder / "nan.parquet")
+    pq.write_table(pa.table({"name": ["a"], "note": ["b"]}), folder / "texts.parquet")
+    np.savez(folder / "objects.npz", time=np.array([object()], dtype=object))
+    np.savez(folder / "lengths.npz", time=TIME[:-1], q=POSITION, tau=EFFORT)
+    np.savez(folder / "no_time.npz", q=POSITION, tau=EFFORT)
+    np.savez(folder / "rate.npz", q=POSITION, tau=EFFORT, rate=0.0)
+    np.savez(folder / "empty.npz", time=TIME[:0], q=POSITION[:0], tau=EFFORT[:0])
+    np.save(folder / "records.npy", np.zeros(3, dtype=[("a", "f8"), ("b", "i4")]))
+    scipy.io.savemat(folder / "strings.mat", {"note": "nothing"})
+    with h5py.File(folder / "nothing.hdf5", "w") as file:
+        file.create_group("observations")
+    state = "sensor_msgs/msg/JointState"
+    twice = joint_state(0) | {"name": ["elbow", "elbow"]}
+    mcap("broken/twice.mcap", [("/joint_states", state, twice, 0)])
+    others = [("/joint_states", state, joint_state(k) | {"name": ["a", "b"]}, 0) for k in range(COUNT)]
+    mcap("broken/others.mcap", others)
+    short = joint_state(0) | {"position": [1.0]}
+    mcap("broken/short.mcap", [("/joint_states", state, short, 0)])
+    with sqlite3.connect(folder / "schema.db3") as base:
+        base.execute("CREATE TABLE topics (id INTEGER, name TEXT)")
+    run = {"observation.state": POSITION, "observation.effort": EFFORT}
+    dataset(folder / "no_drive", "v3.0", ["observation.state"], [run])
+    dataset(folder / "no_episodes", "v3.0", list(run), [{name: values[:0] for name, values in run.items()}])
+    dataset(folder / "widths", "v3.0", list(run), [run])
+    text = (folder / "widths/meta/info.json").read_text()
+    (folder / "widths/meta/info.json").write_text(text.replace("2\n", "3\n"))
+
+
+def same():
+    """One run of an arm with friction that its URDF lacks, in every container, for the command's tests: its diagnosis is one."""
+    folder = HERE / "same"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    time = np.arange(768) / 128
+    # Axes are vertical and the lower link's centre lies on its axis: torques by hand.
+    a, b = [1.1, 2.3, 4.1], [1.7, 2.9, 5.3]
+    position = np.stack([sum(0.3 * np.sin(w * time + w) for w in a), sum(0.3 * np.cos(w * time) for w in b)], axis=1)
+    velocity = np.stack([sum(0.3 * w * np.cos(w * time + w) for w in a), -sum(0.3 * w * np.sin(w * time) for w in b)], axis=1)
+    speed_up = np.stack([-sum(0.3 * w * w * np.sin(w * time + w) for w in a), -sum(0.3 * w * w * np.cos(w * time) for w in b)], axis=1)
+    upper, lower = 0.05, 0.02
+    effort = np.stack([(upper + lower) * speed_up[:, 0] + lower * speed_up[:, 1], lower * speed_up.sum(axis=1)], axis=1)
+    effort += 0.4 * velocity
+    names = ["time"] + [f"{c}.{j}" for c in ["position", "effort"] for j in JOINTS]
+    table = np.column_stack([time, position, effort])
+    text = "\n".join([",".join(names)] + [",".join(repr(float(x)) for x in row) for row in table]) + "\n"
+    with gzip.open(folder / "run.csv.gz", "wb") as file:
+        file.write(text.encode())
+    np.savez_compressed(folder / "run.npz", time=time, position=position, effort=effort, joint_names=JOINTS)
+    np.save(folder / "run.npy", table)
+    scipy.io.savemat(folder / "run.mat", {"t": time, "q": position, "tau": effort}, do_compression=True)
+    with h5py.File(folder / "run.hdf5", "w") as file:
+        for name, values in [("time", time), ("qpos", position), ("effort", effort)]:
+            file.create_dataset(name, data=values, compression="gzip")
+    nested = {"time": time, "q": list(position), "tau": list(effort)}
+    pq.write_table(pa.table(nested), folder / "run.parquet", compression="gzip")
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    kinds, state = types.types, "sensor_msgs/msg/JointState"
+    messages = []
+    for k, t in enumerate(time):
+        ns = START + round(t * 1e9)
+        stamp = {"sec": ns // 10**9, "nanosec": ns % 10**9}
+        numbers = {"name": JOINTS, "position": position[k], "velocity": np.zeros(0), "effort": effort[k]}
+        messages.append((ns, stamp, numbers))
+    lists = lambda numbers: {name: list(values) for name, values in numbers.items()}
+    mcap("same/run.mcap", [("/joint_states", state, {"header": {"stamp": s, "frame_id": ""}} | lists(n), 0) for _, s, n in messages])
+    with Rosbag2Writer(folder / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3) as bag:
+        link = bag.add_connection("/joint_states", state, typestore=types)
+        for ns, s, numbers in messages:
+            head = kinds["std_msgs/msg/Header"](stamp=kinds["builtin_interfaces/msg/Time"](**s), frame_id="")
+            bag.write(link, ns, types.serialize_cdr(kinds[state](header=head, **numbers), state))
+    for version in ["v2.1", "v3.0"]:
+        root = folder / f"lerobot_{version.replace('.', '')}"
+        dataset(root, version, ["observation.state", "observation.effort"], [{"observation.state": position, "observation.effort": effort}])
+        if version == "v2.1":
+            (root / "data/chunk-000/file-000.parquet").rename(root / "data/chunk-000/episode_000000.parquet")
+
+
 if __name__ == "__main__":
     csv()
     arrays()
@@ -258,3 +386,6 @@ if __name__ == "__main__":
     mcaps()
     bags()
     lerobot()
+    without_torque()
+    broken()
+    same()

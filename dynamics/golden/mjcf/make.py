@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 
 HERE = pathlib.Path(__file__).resolve().parent
-JOINTS = {"arm": ["pan", "lift", "elbow", "wrist"], "geoms": ["first", "second", "third"]}
+JOINTS = {name: ["first", "second", "third"] for name in ["geoms", "frames"]}
+JOINTS["arm"] = ["pan", "lift", "elbow", "wrist"]
 
 
 def figures(name, joints):

@@ -64,8 +64,11 @@ struct Walk<'a> {
     findings: Vec<Finding>,
 }
 
-/// Elements of a body that count for its motion, and that a frame would move.
+/// Elements of a body that count for its motion.
 const MOVES: [&str; 3] = ["joint", "freejoint", "inertial"];
+
+/// An element of a body, where the frames that it stands in lie in the body's, and the class that holds there.
+type Framed<'e> = (&'e Element, Placement, Option<&'e str>);
 
 impl Walk<'_> {
     /// What stands in a body, or in a frame of it, that lies at `place` in the link that `carrier` moves.
@@ -80,12 +83,10 @@ impl Walk<'_> {
         for child in &element.children {
             match child.kind.as_str() {
                 "body" => self.body(child, carrier, place, class, in_world)?,
-                "frame" if child.children.iter().any(|inner| MOVES.contains(&inner.kind.as_str())) => {
-                    return Err(MjcfError::new(
-                        "a joint or an inertial inside a <frame> is not read",
-                        "Move it out of the frame, or save the compiled model (mj_saveLastXML) and give that",
-                    )
-                    .at(child));
+                "frame" if in_world && child.children.iter().any(|inner| MOVES.contains(&inner.kind.as_str())) => {
+                    return Err(
+                        MjcfError::new("a joint or an inertial stands in no body", "Put it into a <body>").at(child)
+                    );
                 }
                 "frame" => {
                     let inner = place.compose(&placement(child, self.settings)?);
@@ -114,13 +115,18 @@ impl Walk<'_> {
     ) -> Result<(), MjcfError> {
         let class = body.get("childclass").or(class);
         let name = body.get("name").map_or_else(|| format!("body{}", self.links.len()), str::to_owned);
-        let joints: Vec<Element> = body
-            .children
+        let mut own = Vec::new();
+        self.own(body, Placement::IDENTITY, class, &mut own)?;
+        let joints: Vec<(Element, Placement)> = own
             .iter()
-            .filter(|child| ["joint", "freejoint"].contains(&child.kind.as_str()))
-            .map(|joint| self.settings.filled(joint, class))
-            .collect::<Result<_, _>>()?;
-        if let Some(free) = joints.iter().find(|joint| joint.kind == "freejoint" || joint.get("type") == Some("free")) {
+            .filter(|(child, ..)| ["joint", "freejoint"].contains(&child.kind.as_str()))
+            .map(|(joint, within, class)| Ok((self.settings.filled(joint, *class)?, *within)))
+            .collect::<Result<_, MjcfError>>()?;
+        if let Some(free) = joints
+            .iter()
+            .map(|(joint, _)| joint)
+            .find(|joint| joint.kind == "freejoint" || joint.get("type") == Some("free"))
+        {
             if in_world && !has_joint(body) {
                 note(
                     &mut self.findings,
@@ -139,13 +145,14 @@ impl Walk<'_> {
         // From the frame of the carrying link to that of the body.
         let mut frame = place.compose(&placement(body, self.settings)?);
         let count = joints.len();
-        for (at, joint) in joints.iter().enumerate() {
+        for (at, (joint, within)) in joints.iter().enumerate() {
             let joint_name = joint.get("name").map_or_else(|| format!("{name}_joint{}", at + 1), str::to_owned);
             let link = if at + 1 == count { name.clone() } else { format!("{name}/{joint_name}") };
-            (carrier, frame) = self.joint(joint, joint_name, link, carrier, frame)?;
+            (carrier, frame) = self.joint((joint, within), joint_name, link, carrier, frame)?;
         }
         self.links.push(LinkFrame { name: name.clone(), joint: carrier, placement: frame });
-        let inertia = self.inertia(body, class)?;
+        let inertial = own.iter().find(|(child, ..)| child.kind == "inertial");
+        let inertia = self.inertia(body, inertial, class)?;
         if let Some(carrier) = carrier {
             let moved = &mut self.joints[carrier].inertia;
             *moved = moved.add(&inertia.transform(&frame));
@@ -158,11 +165,30 @@ impl Walk<'_> {
         self.inside(body, carrier, frame, class, false)
     }
 
-    /// Adds a joint that moves the frame `frame` of `carrier`; the joint, or the carrier where it is held, and where
-    /// the body's frame lies in its link.
+    /// The joints and inertials of a body, through the frames that stand in it, in their order.
+    fn own<'e>(
+        &self,
+        element: &'e Element,
+        place: Placement,
+        class: Option<&'e str>,
+        own: &mut Vec<Framed<'e>>,
+    ) -> Result<(), MjcfError> {
+        for child in &element.children {
+            if child.kind == "frame" {
+                let inner = place.compose(&placement(child, self.settings)?);
+                self.own(child, inner, child.get("childclass").or(class), own)?;
+            } else if MOVES.contains(&child.kind.as_str()) {
+                own.push((child, place, class));
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds a joint, which stands `within` the body, that moves the frame `frame` of `carrier`; the joint, or the carrier
+    /// where it is held, and where the body's frame lies in its link.
     fn joint(
         &mut self,
-        joint: &Element,
+        (joint, within): (&Element, &Placement),
         name: String,
         link: String,
         carrier: Option<usize>,
@@ -183,8 +209,10 @@ impl Walk<'_> {
         let Some(axis) = axis.try_normalize() else {
             return refused("its axis has no length".into(), "Give a direction");
         };
+        let axis = within.rotation * axis;
         let unit = if hinge { self.settings.angle } else { 1.0 };
         let anchor = joint.numbers("pos", 3, [0.0; 3])?.map_or(DVec3::ZERO, DVec3::from_array);
+        let anchor = within.rotation * anchor + within.translation;
         let reference = unit * joint.number("ref", 0.0)?;
         // The body lies as the file draws it where the position is `ref`.
         let back = if hinge {
@@ -244,10 +272,11 @@ impl Walk<'_> {
     }
 
     /// Inertia of a body, in its frame.
-    fn inertia(&self, body: &Element, class: Option<&str>) -> Result<Inertia, MjcfError> {
-        let own = body.all("inertial").next();
+    fn inertia(&self, body: &Element, own: Option<&Framed>, class: Option<&str>) -> Result<Inertia, MjcfError> {
         match (own, self.settings.from_geom) {
-            (Some(inertial), FromGeom::Never | FromGeom::Lacking) => geom::inertial(inertial, self.settings),
+            (Some((inertial, within, _)), FromGeom::Never | FromGeom::Lacking) => {
+                Ok(geom::inertial(inertial, self.settings)?.transform(within))
+            }
             (None, FromGeom::Never) => Ok(Inertia::ZERO),
             _ => self.of_geoms(body, Placement::IDENTITY, class),
         }

@@ -70,6 +70,11 @@ fn bodies_of_geoms_weigh_as_in_mujoco() {
 }
 
 #[test]
+fn joints_and_inertials_in_frames_stand_as_in_mujoco() {
+    check(include_str!("../../golden/mjcf/frames.xml"), include_str!("../../golden/mjcf/frames.json"));
+}
+
+#[test]
 fn a_held_joint_stands_at_zero() {
     let (whole, held) = (read(ARM, &[]).unwrap().model, read(ARM, &["lift"]).unwrap().model);
     assert_eq!(held.dof(), 3);
@@ -101,7 +106,7 @@ fn what_the_model_cannot_hold_is_refused_by_name_with_the_mend() {
         (body("<joint damping=\"x\"/><geom size=\"1\"/>"), "damping"),
         (body("<geom size=\"1\"/>"), "no hinge"),
         (body("<replicate count=\"3\"/>"), "<replicate>"),
-        (body("<frame pos=\"1 0 0\"><joint/></frame><geom size=\"1\"/>"), "inside a <frame>"),
+        ("<mujoco><worldbody><frame><joint/></frame></worldbody></mujoco>".into(), "in no body"),
         (with("<include file=\"none.xml\"/>"), "none.xml"),
         ("<robot/>".into(), "<mujoco>"),
         ("<mujoco>".into(), "well-formed"),

@@ -2,14 +2,14 @@
 
 use super::info::Info;
 use crate::arrays::{Array, MOST_NUMBERS};
+use crate::episode::Channel;
 use crate::error::{LogError, LogErrorKind};
-use crate::formats::{Request, cannot_read, parquet};
+use crate::formats::{Each, Request, Run, cannot_read, parquet};
 use crate::recording::Recording;
-use crate::table::Table;
 use std::path::{Path, PathBuf};
 
 /// Passes the chosen episodes of the dataset in `folder` to `each`, one at a time.
-pub(super) fn read(folder: &Path, request: &Request, each: &mut dyn FnMut(Table)) -> Result<(), LogError> {
+pub(super) fn read(folder: &Path, request: &Request, each: Each) -> Result<(), LogError> {
     let text = std::fs::read_to_string(folder.join("meta/info.json")).map_err(|error| cannot_read(&error))?;
     let info = Info::parse(&text)?;
     let mut files = Vec::new();
@@ -34,9 +34,11 @@ pub(super) fn read(folder: &Path, request: &Request, each: &mut dyn FnMut(Table)
     }
     cut.end()?;
     if cut.found == 0 {
-        return Err(
-            LogError::new(LogErrorKind::Empty, "the dataset has no such episode").hint("Choose others: --episodes 0-9")
-        );
+        let (found, mend) = match request.options.episodes.is_empty() {
+            true => ("no episode of the dataset has a row", "Download the dataset with its data, or record it again"),
+            false => ("the dataset has no such episode", "Choose others: --episodes 0-9"),
+        };
+        return Err(LogError::new(LogErrorKind::Empty, found).hint(mend));
     }
     Ok(())
 }
@@ -61,7 +63,7 @@ fn parquet_files(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) {
 struct Cut<'a, 'b> {
     info: &'a Info,
     request: &'a Request<'b>,
-    each: &'a mut dyn FnMut(Table),
+    each: Each<'a>,
     episode: Option<u64>,
     /// The file in which it begins.
     begins: String,
@@ -79,7 +81,7 @@ impl Cut<'_, '_> {
             return Ok(());
         }
         let file = parquet::open(path)?;
-        let mapped = !self.request.options.map.is_empty();
+        let mapped = self.request.by_own_names();
         let wanted = |name: &str| {
             if mapped && self.info.others.iter().any(|feature| feature == name) {
                 return true;
@@ -177,7 +179,7 @@ impl Cut<'_, '_> {
             }
         }
         // What a map may name: `feature[0]`, `feature[1]`, ….
-        let mapped = !self.request.options.map.is_empty();
+        let mapped = self.request.by_own_names();
         for column in columns.iter().filter(|_| mapped) {
             let width = column.shape.get(1).copied().unwrap_or(1);
             for at in 0..width {
@@ -185,25 +187,36 @@ impl Cut<'_, '_> {
                 recording.add(format!("{}[{at}]", column.name), values);
             }
         }
-        if !mapped && !recording.columns.iter().any(|(name, _)| name.starts_with("effort")) {
-            let others = if self.info.others.is_empty() {
-                String::new()
-            } else {
-                format!("; features that are not read: {}", self.info.others.join(", "))
-            };
-            return Err(LogError::new(
-                LogErrorKind::MissingColumn,
-                format!("no feature holds the torque of the joints{others}"),
-            )
-            .column("observation.effort")
-            .hint("A diagnosis needs the torque in N m: add a feature observation.effort, or map the motor current with the torque constant as scale (--map-file)"));
+        if !mapped {
+            self.require_drive(&recording)?;
         }
-        let table = recording
-            .table(self.request)
-            .map_err(|error| LogError { found: format!("episode {number}: {}", error.found), ..error })?;
         self.found += 1;
-        (self.each)(table);
-        Ok(())
+        (self.each)(Run::Columns(recording))
+            .map_err(|error| LogError { found: format!("episode {number}: {}", error.found), ..error })
+    }
+
+    /// An error where no feature says what drives the joints.
+    fn require_drive(&self, recording: &Recording) -> Result<(), LogError> {
+        let without_effort = self.request.options.without_effort;
+        let drives = |(name, _): &(String, Vec<f64>)| {
+            let channel = name.split_once('.').and_then(|(channel, _)| Channel::from_name(channel));
+            channel.is_some_and(|channel| {
+                if without_effort { channel.drives() } else { matches!(channel, Channel::Effort | Channel::EffortLink) }
+            })
+        };
+        if recording.columns.iter().any(drives) {
+            return Ok(());
+        }
+        let what =
+            if without_effort { "what drives the joints: a torque, or an action" } else { "the torque of the joints" };
+        let others = if self.info.others.is_empty() {
+            String::new()
+        } else {
+            format!("; features that are not read: {}", self.info.others.join(", "))
+        };
+        Err(LogError::new(LogErrorKind::MissingColumn, format!("no feature holds {what}{others}"))
+            .column(if without_effort { "action" } else { "observation.effort" })
+            .hint("Add a feature observation.effort in N m, or action in the unit of observation.state; or map one (--map-file)"))
     }
 
     /// The time of each row, s: stamps that were measured, or the rate where they were made from it.
@@ -250,6 +263,16 @@ impl Cut<'_, '_> {
             recording
                 .notes
                 .push("the dataset does not name its joints: they are taken in the robot's order".to_owned());
+        }
+        let read_as = |channel: Channel| {
+            let start = format!("{}.", channel.name());
+            let names = |names: &Vec<Option<String>>| names.iter().flatten().any(|name| name.starts_with(&start));
+            self.info.features.iter().find(|(_, columns)| names(columns)).map(|(feature, _)| feature)
+        };
+        if let Some(feature) = read_as(Channel::Current) {
+            recording.notes.push(format!(
+                "{feature} is read as the current of the motors in A; in another unit, torque constants come out in that"
+            ));
         }
         let robot = self.info.robot_type.to_lowercase();
         if self.request.options.calibration.is_some() {

@@ -40,7 +40,8 @@ impl Info {
         let (mut read, mut others) = (Vec::new(), Vec::new());
         for (key, feature) in features {
             let kind = feature.get("dtype").and_then(Value::as_str).unwrap_or_default();
-            if !kind.starts_with("float") || key == "timestamp" {
+            let is_number = kind.starts_with("float") || (kind.starts_with("int") && key.starts_with("observation."));
+            if !is_number || key == "timestamp" {
                 continue;
             }
             let Some(channel) = channel(key) else {
@@ -82,7 +83,8 @@ fn column(channel: Channel, name: Option<&String>, at: usize) -> Option<String> 
         Some((joint, "effort" | "torque" | "tau")) => {
             (joint, (channel == Channel::Position).then_some(Channel::Effort))
         }
-        Some((_, "current" | "temperature" | "temp")) => return None,
+        Some((joint, "current")) => (joint, (channel == Channel::Position).then_some(Channel::Current)),
+        Some((_, "temperature" | "temp")) => return None,
         _ => (name.as_str(), Some(channel)),
     };
     own.map(|channel| format!("{}.{joint}", channel.name()))
@@ -124,7 +126,8 @@ mod tests {
             r#"{{"codebase_version": "v2.1", "fps": 30, "features": {{
                 "observation.state": {{"dtype": "float32", "shape": [2], "names": {names}}},
                 "observation.effort": {{"dtype": "float32", "shape": [2], "names": null}},
-                "observation.motor_currents": {{"dtype": "float32", "shape": [2]}},
+                "observation.motor_currents": {{"dtype": "int64", "shape": [2]}},
+                "observation.weather": {{"dtype": "float32", "shape": [2]}},
                 "observation.images.top": {{"dtype": "video", "shape": [3, 4, 4]}}}}}}"#
         ))
         .unwrap()
@@ -134,12 +137,13 @@ mod tests {
     fn names_come_as_a_list_an_object_or_not_at_all() {
         for names in [r#"["a.pos", "b.pos"]"#, r#"{"motors": ["a", "b"]}"#, r#"[["a", "b"]]"#, r#"{"b": 1, "a": 0}"#] {
             let info = info(names);
-            assert_eq!(info.features[1].1, [Some("position.a".into()), Some("position.b".into())], "{names}");
+            assert_eq!(info.features[1].1, [Some("current.a".into()), Some("current.b".into())], "{names}");
+            assert_eq!(info.features[2].1, [Some("position.a".into()), Some("position.b".into())], "{names}");
             assert_eq!(info.features[0].0, "observation.effort");
-            assert_eq!(info.others, ["observation.motor_currents"]);
+            assert_eq!(info.others, ["observation.weather"]);
         }
-        assert_eq!(info("null").features[1].1, [Some("position.#1".into()), Some("position.#2".into())]);
-        assert_eq!(info(r#"["a.pos", "a.torque"]"#).features[1].1[1], Some("effort.a".into()));
+        assert_eq!(info("null").features[2].1, [Some("position.#1".into()), Some("position.#2".into())]);
+        assert_eq!(info(r#"["a.pos", "a.torque"]"#).features[2].1[1], Some("effort.a".into()));
     }
 
     #[test]

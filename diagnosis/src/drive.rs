@@ -101,6 +101,13 @@ struct Study<'a> {
     through: bool,
 }
 
+/// Runs as they were logged, or with some noise more.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Runs {
+    Logged,
+    Noisier,
+}
+
 /// How what is left is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct View {
@@ -211,8 +218,7 @@ impl<'a> Study<'a> {
         if !tells(&self.rigid, &self.rigid.left) {
             return None;
         }
-        let rest =
-            self.rows(&self.runs, &Candidate::new(Kind::Armature, vec![self.joint]), self.rotor, View::default());
+        let rest = self.rows(&Candidate::new(Kind::Armature, vec![self.joint]), self.rotor, View::default());
         let left_of = |e: usize| mean_square(&rest[self.logs.band.of_episode[e].clone()]);
         let episode = (0..self.runs.len()).max_by(|&a, &b| left_of(a).total_cmp(&left_of(b)));
         let first = self.rigid_in(View { episode, smooth: None });
@@ -231,11 +237,11 @@ impl<'a> Study<'a> {
                 let measured = |(drive, rotor): (Candidate, f64)| (self.measure(&drive, rotor), drive, rotor);
                 // Where most of the time is spent in the gap, the rotor of a rigid drive is far off.
                 let rotors = || ROTOR.iter().map(|part| part * self.inertia).chain([self.rotor]);
-                let mut tried: Vec<(f64, Candidate, f64)> = grid
-                    .iter()
-                    .flat_map(|&shape| rotors().map(move |rotor| (at(shape), rotor)))
-                    .map(|(drive, rotor)| (self.first_measure(episode, &first, &drive, rotor), drive, rotor))
-                    .collect();
+                let open: Vec<(Candidate, f64)> =
+                    grid.iter().flat_map(|&shape| rotors().map(move |rotor| (at(shape), rotor))).collect();
+                let measures = self.first_measures(episode, &first, &open);
+                let mut tried: Vec<(f64, Candidate, f64)> =
+                    measures.into_iter().zip(open).map(|(measure, (drive, rotor))| (measure, drive, rotor)).collect();
                 tried.sort_by(|a, b| a.0.total_cmp(&b.0));
                 tried.truncate(FIRST);
                 let descended: Vec<(Candidate, f64)> =
@@ -292,17 +298,17 @@ impl<'a> Study<'a> {
         let view = self.view(&drive, rotor);
         let nothing = self.against(&drive, rotor).nothing;
         for _ in 0..DESCENTS {
-            let rest = self.rows(&self.runs, &drive, rotor, view);
+            let by = 1.0 + STEPS.1;
+            let stiffer = Candidate { shape: drive.shape * by.powf(power), ..drive.clone() };
+            let moved = [(&drive, rotor), (&stiffer, rotor), (&drive, rotor * by)];
+            let rows = self.rows_each(&moved.map(|(drive, rotor)| (Runs::Logged, drive, rotor)), view);
+            let [rest, knob, motor] = rows.as_slice() else { break };
             let mut size = vec![(0.0, 0.0); self.logs.band.blocks];
-            for (row, rest) in self.logs.band.rows.iter().zip(&rest) {
+            for (row, rest) in self.logs.band.rows.iter().zip(rest) {
                 size[row.block].0 += rest * rest;
                 size[row.block].1 += 1.0;
             }
             let weight = |row: &Row| 1.0 / (size[row.block].0 / size[row.block].1 + nothing);
-            let by = 1.0 + STEPS.1;
-            let stiffer = Candidate { shape: drive.shape * by.powf(power), ..drive.clone() };
-            let knob = self.rows(&self.runs, &stiffer, rotor, view);
-            let motor = self.rows(&self.runs, &drive, rotor * by, view);
             let mut gram = Matrix2::zeros();
             let mut moment = Vector2::zeros();
             for (i, row) in self.logs.band.rows.iter().enumerate() {
@@ -319,8 +325,37 @@ impl<'a> Study<'a> {
     }
 
     /// What a drive leaves at the rows of the band; nothing of the episodes that are not looked at.
-    fn rows(&self, runs: &[impl Borrow<JointRun>], drive: &Candidate, rotor: f64, view: View) -> Vec<f64> {
-        self.rows_of(runs, view, |run| run.left_by(drive, rotor))
+    fn rows(&self, drive: &Candidate, rotor: f64, view: View) -> Vec<f64> {
+        self.rows_each(&[(Runs::Logged, drive, rotor)], view).pop().unwrap_or_default()
+    }
+
+    /// The same of several, each of these runs or those, a drive and a rotor.
+    fn rows_each(&self, asked: &[(Runs, &Candidate, f64)], view: View) -> Vec<Vec<f64>> {
+        let seen: Vec<usize> = (0..self.runs.len()).filter(|e| view.episode.is_none_or(|only| only == *e)).collect();
+        let run = |of: Runs, e: usize| match of {
+            Runs::Logged => self.runs[e],
+            Runs::Noisier => &self.noisier[e],
+        };
+        let all: Vec<(&JointRun, &Candidate, f64)> = (asked.iter())
+            .flat_map(|&(of, drive, rotor)| seen.iter().map(move |&e| (run(of, e), drive, rotor)))
+            .collect();
+        let mut left = JointRun::left_by_each(&all).into_iter();
+        let rows = |_| {
+            let mut rows = vec![0.0; self.logs.band.rows.len()];
+            for (&e, torque) in seen.iter().zip(&mut left) {
+                self.place(&mut rows, e, smooth(torque, view.smooth, self.runs[e].dt));
+            }
+            rows
+        };
+        asked.iter().map(rows).collect()
+    }
+
+    /// Puts a torque of a run at its rows of the band.
+    fn place(&self, rows: &mut [f64], e: usize, torque: Vec<f64>) {
+        let at_rows = self.logs.band.filter_where(e, &self.slides[e], &torque);
+        for (row, seen) in rows[self.logs.band.of_episode[e].clone()].iter_mut().zip(at_rows) {
+            *row = seen.unwrap_or(0.0);
+        }
     }
 
     /// A torque of each run at the rows of the band, in a view.
@@ -328,11 +363,7 @@ impl<'a> Study<'a> {
         let mut rows = vec![0.0; self.logs.band.rows.len()];
         for (e, run) in runs.iter().enumerate().filter(|(e, _)| view.episode.is_none_or(|only| only == *e)) {
             let run: &JointRun = run.borrow();
-            let seen = smooth(torque(run), view.smooth, run.dt);
-            let at_rows = self.logs.band.filter_where(e, &self.slides[e], &seen);
-            for (row, seen) in rows[self.logs.band.of_episode[e].clone()].iter_mut().zip(at_rows) {
-                *row = seen.unwrap_or(0.0);
-            }
+            self.place(&mut rows, e, smooth(torque(run), view.smooth, run.dt));
         }
         rows
     }
@@ -347,8 +378,7 @@ impl<'a> Study<'a> {
 
     fn rigid_in(&self, view: View) -> Rigid {
         let account = Candidate::new(Kind::Armature, vec![self.joint]);
-        let rest = self.rows(&self.runs, &account, self.rotor, view);
-        let noise = self.noise(&account, self.rotor, &rest, view);
+        let (rest, noise) = self.rows_and_noise(&account, self.rotor, view);
         let seen: Vec<f64> = noise.iter().copied().filter(|noise| *noise > 0.0).collect();
         let nothing = OF_NOISE * mean(&seen) + self.unnoticed;
         let mut rigid = Rigid { noise, nothing, left: Vec::new() };
@@ -399,13 +429,23 @@ impl<'a> Study<'a> {
         mean_logarithm(self.left(drive, rotor, &rigid)) - mean_logarithm(&rigid.left)
     }
 
-    /// A first look at the same: of one episode alone, and with a rigid drive's noise.
-    fn first_measure(&self, episode: Option<usize>, plain: &Rigid, drive: &Candidate, rotor: f64) -> f64 {
-        let view = View { episode, ..self.view(drive, rotor) };
-        let rigid = if view.smooth.is_none() { Cow::Borrowed(plain) } else { Cow::Owned(self.rigid_in(view)) };
-        let noise = taken_off(&rigid.noise, &rigid, view);
-        let left = self.beyond(self.rows(&self.runs, drive, rotor, view), &noise, rigid.nothing);
-        mean_logarithm(&left) - mean_logarithm(&rigid.left)
+    /// A first look at the same of several drives with their rotors: of one episode alone, and with a rigid drive's noise.
+    fn first_measures(&self, episode: Option<usize>, plain: &Rigid, all: &[(Candidate, f64)]) -> Vec<f64> {
+        let measure = |rows: Vec<f64>, rigid: &Rigid, view: View| {
+            let left = self.beyond(rows, &taken_off(&rigid.noise, rigid, view), rigid.nothing);
+            mean_logarithm(&left) - mean_logarithm(&rigid.left)
+        };
+        if self.through {
+            let one = |(drive, rotor): &(Candidate, f64)| {
+                let view = View { episode, ..self.view(drive, *rotor) };
+                measure(self.rows(drive, *rotor, view), &self.rigid_in(view), view)
+            };
+            return all.iter().map(one).collect();
+        }
+        let view = View { episode, smooth: None };
+        let asked: Vec<(Runs, &Candidate, f64)> =
+            all.iter().map(|(drive, rotor)| (Runs::Logged, drive, *rotor)).collect();
+        self.rows_each(&asked, view).into_iter().map(|rows| measure(rows, plain, view)).collect()
     }
 
     /// Mean square of each block that a drive leaves beyond noise and nothing, (N m)².
@@ -414,8 +454,8 @@ impl<'a> Study<'a> {
     }
 
     fn left_in(&self, drive: &Candidate, rotor: f64, rigid: &Rigid, view: View) -> Vec<f64> {
-        let rest = self.rows(&self.runs, drive, rotor, view);
-        let noise = taken_off(&self.noise(drive, rotor, &rest, view), rigid, view);
+        let (rest, noise) = self.rows_and_noise(drive, rotor, view);
+        let noise = taken_off(&noise, rigid, view);
         self.beyond(rest, &noise, rigid.nothing)
     }
 
@@ -424,10 +464,13 @@ impl<'a> Study<'a> {
         left.map(|(left, noise)| (left - noise).max(0.0) + nothing).collect()
     }
 
-    /// Mean square of what more noise changes of a rest, in each block, (N m)².
-    fn noise(&self, drive: &Candidate, rotor: f64, rest: &[f64], view: View) -> Vec<f64> {
-        let noisier = self.rows(&self.noisier, drive, rotor, view);
-        self.mean_squares(noisier.iter().zip(rest).map(|(noisier, rest)| noisier - rest).collect())
+    /// What a drive leaves at the rows of the band, and the mean square of what more noise changes of that in each block, (N m)².
+    fn rows_and_noise(&self, drive: &Candidate, rotor: f64, view: View) -> (Vec<f64>, Vec<f64>) {
+        let asked = [Runs::Logged, Runs::Noisier].map(|of| (of, drive, rotor));
+        let mut both = self.rows_each(&asked, view).into_iter();
+        let (rest, noisier) = (both.next().unwrap_or_default(), both.next().unwrap_or_default());
+        let noise = self.mean_squares(noisier.iter().zip(&rest).map(|(noisier, rest)| noisier - rest).collect());
+        (rest, noise)
     }
 
     /// Of every block that has rows.
@@ -438,21 +481,21 @@ impl<'a> Study<'a> {
     /// Standard error of the knob, the rotor free: sandwich over blocks.
     fn error(&self, drive: &Candidate, rotor: f64) -> f64 {
         let view = self.view(drive, rotor);
-        let rows = |drive: &Candidate, rotor: f64| self.rows(&self.runs, drive, rotor, view);
-        let rest = rows(drive, rotor);
-        let slope = |step: f64, moved: Vec<f64>, back: Vec<f64>| -> Vec<f64> {
-            moved.iter().zip(&back).map(|(m, b)| (m - b) / (2.0 * step)).collect()
+        let knob = |by: f64| Candidate { shape: drive.shape + by, ..drive.clone() };
+        let by = [STEPS.1 * drive.shape, STEPS.1 * rotor];
+        let (more, less) = (knob(by[0]), knob(-by[0]));
+        let moved = [(drive, rotor), (&more, rotor), (&less, rotor), (drive, rotor + by[1]), (drive, rotor - by[1])];
+        let rows = self.rows_each(&moved.map(|(drive, rotor)| (Runs::Logged, drive, rotor)), view);
+        let slope = |step: f64, moved: &[f64], back: &[f64]| -> Vec<f64> {
+            moved.iter().zip(back).map(|(m, b)| (m - b) / (2.0 * step)).collect()
         };
-        let by = STEPS.1 * drive.shape;
-        let knob = |by: f64| rows(&Candidate { shape: drive.shape + by, ..drive.clone() }, rotor);
-        let knob = slope(by, knob(by), knob(-by));
-        let by = STEPS.1 * rotor;
-        let rotor = slope(by, rows(drive, rotor + by), rows(drive, rotor - by));
+        let [rest, more, less, heavier, lighter] = rows.as_slice() else { return f64::INFINITY };
+        let (knob, rotor) = (slope(by[0], more, less), slope(by[1], heavier, lighter));
         // The knob's slope less what the rotor could make up for.
         let part = dot(&knob, &rotor) / dot(&rotor, &rotor).max(f64::MIN_POSITIVE);
         let own: Vec<f64> = knob.iter().zip(&rotor).map(|(k, r)| k - part * r).collect();
         let mut scores = vec![0.0; self.logs.band.blocks];
-        for (row, (own, rest)) in self.logs.band.rows.iter().zip(own.iter().zip(&rest)) {
+        for (row, (own, rest)) in self.logs.band.rows.iter().zip(own.iter().zip(rest)) {
             scores[row.block] += own * rest;
         }
         dot(&scores, &scores).sqrt() / dot(&own, &own).max(f64::MIN_POSITIVE)

@@ -4,29 +4,19 @@ use crate::filter::{first_derivative, first_order, second_derivative, smoothed};
 use crate::plant::CONTACT;
 use crate::{Candidate, EncoderSide, Kind, Motion};
 use gapscope_dynamics::{Data, Model};
-use nalgebra::{DMatrix, Matrix2, Vector2};
+use nalgebra::DMatrix;
+use oscillator::{Begun, follow};
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
-/// Longest step of the oscillator, s: a contact at 20 Hz takes a hundred of them a period.
-const STEP: f64 = 5e-4;
+mod oscillator;
+
+pub(crate) use oscillator::Oscillator;
 
 /// Damping ratio of the flattest response (Butterworth).
 const FLAT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Torque that shows play to be taken up, over what would wind the coupling by half the gap.
 const TAKEN_UP: f64 = 0.01;
-
-/// Samples, at least, from which a spring's first angle and its rate are told, by what it does in its first period.
-const LEAST_SEEN: usize = 8;
-
-/// Time in which play is crossed and its side known, s, places in the gap from which that is tried, and the longest time for
-/// which it was let go before the first sample, s.
-const CROSSED: f64 = 0.1;
-const PLACES: usize = 8;
-const LET_GO_FOR: f64 = 0.02;
-/// Part of the squared torque at first to which play at rest must account for it for no other start to be tried.
-const SETTLED: f64 = 0.01;
-/// What another start must leave of what play at rest does: a gap that is not quite right is no other start.
-const BEYOND_DOUBT: f64 = 0.25;
 
 /// Half-width of the window that a spring's angle goes through before it is differentiated, s; about 18 Hz. Faster than that no
 /// spring of a robot winds up, and noise would leak past where a joint rests.
@@ -35,8 +25,8 @@ const WIND_UP: f64 = 0.025;
 /// Samples over which the rate of a spring is told as friction begins to hold its link.
 const SLOPE_OVER: usize = 4;
 
-/// A coupling that is so soft, under a link that falls, that it runs away begins anew from here, rad (m).
-const LET_GO: f64 = 100.0;
+/// Oscillators that are followed side by side.
+const LANES: usize = 8;
 
 /// What joins motor and link: torque k δ + d δ̇ beyond half the play on either side, and never a pull.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,14 +61,9 @@ impl Coupling {
         }
     }
 
-    /// The angle that a torque is seen to hold, after an angle that was expected: play lies anywhere in its gap while hardly
-    /// any torque passes.
-    fn held_by(&self, torque: f64, expected: f64) -> f64 {
-        if torque.abs() > TAKEN_UP * self.stiffness * self.half_gap {
-            torque / self.stiffness + self.half_gap * torque.signum()
-        } else {
-            expected.clamp(-self.half_gap, self.half_gap)
-        }
+    /// The torque beyond which an angle is seen by it: play lies anywhere in its gap while hardly any torque passes.
+    fn shown_from(&self) -> f64 {
+        TAKEN_UP * self.stiffness * self.half_gap
     }
 
     /// Rate, 1/s, at which an angle is drawn to the one seen, so that the difference of the two dies away with all the
@@ -123,169 +108,6 @@ pub(crate) struct Drag {
     pub taken: Vec<f64>,
     /// Samples at which the joint rests and its friction holds what nobody knows.
     pub holds: Vec<bool>,
-}
-
-/// An inertia on a coupling along a run: I δ̈ = drive + f(q̇_m − δ̇) − slope δ − τ_l(δ, δ̇).
-///
-/// Where the motor's motion is logged, I is the link's inertia and `drive` the torque that the link would take if it went with
-/// its motor; where the link's is, I is the rotor's and `drive` the effort less what the rotor takes to go with its link.
-/// Either way nothing is differentiated.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Oscillator<'a> {
-    /// Sample by sample, N m (N).
-    pub drive: &'a [f64],
-    /// I, sample by sample, kg m² (kg).
-    pub inertia: &'a [f64],
-    /// How fast the drive falls as the angle grows, N m/rad, sample by sample: a link that sags has another weight.
-    pub slope: Option<&'a [f64]>,
-    /// Friction f of the link, where its motor's motion is logged; `drive` is without it.
-    pub drag: Option<&'a Drag>,
-    /// What joins the two.
-    pub coupling: Coupling,
-    /// Time from one sample to the next, s.
-    pub dt: f64,
-}
-
-impl Oscillator<'_> {
-    /// The wind-up from rest under the first sample's drive, or from the state that it is `seen` to begin in.
-    ///
-    /// Left to itself the oscillation rings with the noise of the drive, and play chatters as no simulation follows.
-    /// `seen` is the torque through the joint by the account of the other side of it: the angle is drawn to the one that it
-    /// shows (Luenberger, IEEE Trans. Autom. Control 16(6) 1971). A torque that a model lacks shows up in full all the
-    /// same, as the pull acts on what the angle does, not on what holds it.
-    pub fn wind_up(&self, seen: Option<&[f64]>) -> WindUp {
-        let first = self.drive.first().copied().unwrap_or(0.0);
-        let at_rest = (first / self.coupling.stiffness + self.coupling.half_gap * first.signum(), 0.0);
-        self.from(seen.and_then(|seen| self.start(seen, at_rest)).unwrap_or(at_rest), seen)
-    }
-
-    /// Puts the angle of a run left to itself where it is not known, from the angle and rate before to the angle behind.
-    fn bridge(&self, angle: &mut [f64], unknown: &[bool]) {
-        let mut k = 0;
-        while let Some(from) = (k..angle.len()).find(|&k| unknown[k]) {
-            let to = (from..angle.len()).find(|&k| !unknown[k]).unwrap_or(angle.len());
-            k = to;
-            let begin = from.saturating_sub(1);
-            let rate = match from.checked_sub(1 + SLOPE_OVER).filter(|first| !unknown[*first..from].contains(&true)) {
-                Some(first) => (angle[begin] - angle[first]) / (SLOPE_OVER as f64 * self.dt),
-                None => 0.0,
-            };
-            let start = if from == 0 { self.drive[0] / self.coupling.stiffness } else { angle[begin] };
-            let end = (to + 1).min(angle.len());
-            let part = Oscillator { drive: &self.drive[begin..end], inertia: &self.inertia[begin..end], ..*self };
-            let free = part.from((start, rate), None).angle;
-            // What the two ends do not agree on is spread evenly.
-            let off = if to < angle.len() { angle[to] - free[to - begin] } else { 0.0 };
-            for k in from..to {
-                angle[k] = free[k - begin] + off * (k - begin) as f64 / (to - begin) as f64;
-            }
-        }
-    }
-
-    /// First angle and rate of the run that comes nearest to the torque `seen` at first (least squares); nothing for what is
-    /// too short to tell.
-    fn start(&self, seen: &[f64], at_rest: (f64, f64)) -> Option<(f64, f64)> {
-        if self.coupling.half_gap > 0.0 { self.start_of_play(seen, at_rest) } else { self.start_of_spring(seen) }
-    }
-
-    /// Of play, where it is not at rest under its load: somewhere in the gap, at a rate that it took up as it was let go.
-    fn start_of_play(&self, seen: &[f64], at_rest: (f64, f64)) -> Option<(f64, f64)> {
-        let samples = ((CROSSED / self.dt) as usize).clamp(LEAST_SEEN, self.drive.len().max(LEAST_SEEN));
-        let (drive, inertia) = (self.drive.get(..samples)?, self.inertia.get(..samples)?);
-        let first = Oscillator { drive, inertia, slope: self.slope.and_then(|slope| slope.get(..samples)), ..*self };
-        let seen = seen.get(..samples)?;
-        let off = |start: (f64, f64)| -> f64 {
-            first.torque_from(start).iter().zip(seen).map(|(torque, seen)| (torque - seen).powi(2)).sum()
-        };
-        let least = off(at_rest);
-        if least <= SETTLED * dot(seen, seen) {
-            return Some(at_rest);
-        }
-        let let_go = LET_GO_FOR * drive.first()? / inertia.first()?;
-        let angles = (0..=PLACES).map(|i| (2.0 * i as f64 / PLACES as f64 - 1.0) * self.coupling.half_gap);
-        let starts = angles.flat_map(|angle| [0.0, 0.5, 1.0].map(|part| (angle, part * let_go)));
-        let best = starts.map(|start| (off(start), start)).min_by(|a, b| a.0.total_cmp(&b.0));
-        best.map(|(off, start)| if off < BEYOND_DOUBT * least { start } else { at_rest })
-    }
-
-    /// Of a spring: of the runs from any state, that in the first period.
-    fn start_of_spring(&self, seen: &[f64]) -> Option<(f64, f64)> {
-        let period = TAU * (self.inertia.first()? / self.coupling.stiffness).sqrt();
-        let samples = ((period / self.dt) as usize).clamp(LEAST_SEEN, self.drive.len().max(LEAST_SEEN));
-        let driven = Oscillator {
-            drive: self.drive.get(..samples)?,
-            inertia: self.inertia.get(..samples)?,
-            slope: self.slope.and_then(|slope| slope.get(..samples)),
-            ..*self
-        };
-        let still = vec![0.0; samples];
-        let free = Oscillator { drive: &still, ..driven };
-        // Without play the torque is linear in the state that it begins in.
-        let [forced, wound, turning] =
-            [driven.torque_from((0.0, 0.0)), free.torque_from((1.0, 0.0)), free.torque_from((0.0, 1.0 / period))];
-        let rest: Vec<f64> = seen.get(..samples)?.iter().zip(&forced).map(|(seen, forced)| seen - forced).collect();
-        let across = dot(&wound, &turning);
-        let own = Matrix2::new(dot(&wound, &wound), across, across, dot(&turning, &turning));
-        let start = own.cholesky()?.solve(&Vector2::new(dot(&wound, &rest), dot(&turning, &rest)));
-        start.iter().all(|x| x.is_finite()).then_some((start[0], start[1] / period))
-    }
-
-    /// Torque through the coupling of a run left to itself from an angle and its rate, N m (N).
-    fn torque_from(&self, start: (f64, f64)) -> Vec<f64> {
-        self.from(start, None).torque(&self.coupling)
-    }
-
-    /// The wind-up from an angle and its rate, semi-implicit Euler in steps of half a millisecond.
-    fn from(&self, (mut angle, mut rate): (f64, f64), seen: Option<&[f64]>) -> WindUp {
-        let Oscillator { drive, inertia, slope, drag, coupling, dt } = *self;
-        let steps = (dt / STEP).ceil().max(1.0);
-        let h = dt / steps;
-        let mut out = WindUp {
-            angle: Vec::with_capacity(drive.len()),
-            rate: Vec::with_capacity(drive.len()),
-            acceleration: Vec::with_capacity(drive.len()),
-        };
-        // Friction of the last step, N m.
-        let mut friction = 0.0;
-        // Rate at which the angle is drawn to the one seen, rad/s: the link is seen to turn with it.
-        let mut drawn = 0.0;
-        for (k, (&now, &inertia)) in drive.iter().zip(inertia).enumerate() {
-            out.angle.push(angle);
-            out.rate.push(rate);
-            let slope = slope.map_or(0.0, |slope| slope[k]);
-            out.acceleration.push((now + friction - slope * angle - coupling.torque(angle, rate)) / inertia);
-            let next = drive.get(k + 1).copied().unwrap_or(now);
-            let seen = seen.map(|s| (s[k], s.get(k + 1).copied().unwrap_or(s[k])));
-            let pull = -(-h * coupling.pull(inertia)).exp_m1();
-            let per_torque = h / inertia;
-            for i in 0..steps as usize {
-                let part = (i as f64 + 0.5) / steps;
-                let drive = now + (next - now) * part;
-                rate += per_torque * (drive - slope * angle - coupling.torque(angle, rate));
-                if let Some(drag) = drag {
-                    let motor = drag.speed[k];
-                    let motor = motor + (drag.speed.get(k + 1).copied().unwrap_or(motor) - motor) * part;
-                    let free = motor - drawn - rate;
-                    let wet = free / (1.0 + per_torque * drag.viscous);
-                    // A link without inertia, or one that a fit in between made no body, has none to hold.
-                    let hold = if inertia > 0.0 { per_torque * drag.dry[k] } else { 0.0 };
-                    let link = wet - wet.clamp(-hold, hold);
-                    friction = (free - link) / per_torque;
-                    rate = motor - drawn - link;
-                }
-                angle += h * rate;
-                if let Some((now, next)) = seen {
-                    let off = coupling.held_by(now + (next - now) * part, angle) - angle;
-                    drawn = pull * off / h;
-                    angle += pull * off;
-                }
-            }
-            if !(angle.abs() < LET_GO && rate.abs() < LET_GO / h) {
-                (angle, rate, drawn) = (0.0, 0.0, 0.0);
-            }
-        }
-        out
-    }
 }
 
 impl WindUp {
@@ -349,35 +171,16 @@ impl JointRun {
     /// (kg), or a rigid one with that rotor where the candidate is of another kind. Play and spring to the side of the
     /// transmission that the candidate has, as [`crate::Plant::residuals`] has them for this joint alone.
     pub fn left_by(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
-        let turning = |k: usize| self.delivered[k] - rotor * self.acceleration[k];
-        let taken = |k: usize| self.delivered[k] - self.rest[k];
-        let all = 0..self.rest.len();
-        let (motor, link): (Vec<f64>, Vec<f64>) = all.clone().map(|k| (turning(k), taken(k))).unzip();
-        let Some(coupling) = Coupling::of(drive) else {
-            return motor.iter().zip(&link).map(|(motor, link)| motor - link).collect();
-        };
-        match drive.side {
-            EncoderSide::Motor => {
-                let smooth: Vec<f64> = link.iter().zip(&self.drag.taken).map(|(link, drag)| link - drag).collect();
-                let own = Oscillator {
-                    drive: &smooth,
-                    inertia: &self.inertia,
-                    slope: Some(&self.slope[..]),
-                    drag: Some(&self.drag),
-                    coupling,
-                    dt: self.dt,
-                };
-                let passed = own.wind_up(Some(&motor)).torque(&coupling);
-                all.map(|k| motor[k] - passed[k]).collect()
-            }
-            EncoderSide::Link => {
-                let ahead = WindUp::of_motor(&motor, &link, &self.drag.holds, rotor, &coupling, self.dt);
-                let passed = ahead.torque(&coupling);
-                // Where friction holds the link, what its coupling holds is what the motor passes on.
-                let taken = |k: usize| if self.drag.holds[k] { passed[k] } else { link[k] };
-                all.map(|k| motor[k] - rotor * ahead.acceleration[k] - taken(k)).collect()
-            }
-        }
+        JointRun::left_by_each(&[(self, drive, rotor)]).pop().unwrap_or_default()
+    }
+
+    /// The same of several runs, drives and rotors, which is faster than one after the other.
+    pub fn left_by_each(all: &[(&JointRun, &Candidate, f64)]) -> Vec<Vec<f64>> {
+        let sides: Vec<Sides<'_>> = all.iter().map(|&(run, drive, rotor)| Sides::of(run, drive, rotor)).collect();
+        let begun: Vec<Option<Begun<'_>>> = sides.iter().map(Sides::begun).collect();
+        let mut followed = follow(&begun.iter().flatten().copied().collect::<Vec<_>>()).into_iter();
+        let ends = begun.iter().map(|begun| begun.and_then(|_| followed.next()));
+        sides.iter().zip(ends).map(|(sides, ahead)| sides.left(ahead)).collect()
     }
 
     /// What a rigid drive would leave, N m (N), had the joint had the elasticity or play of a candidate, with a rotor of
@@ -398,6 +201,72 @@ impl JointRun {
         // Of the angle, as what drives a spring that hardly moves is a small difference of large torques.
         let acceleration = second_derivative(&free.wind_up(None).angle, self.dt);
         acceleration.iter().enumerate().map(|(k, acceleration)| of(k) * acceleration).collect()
+    }
+}
+
+/// A run with an account of its drive, seen from both sides of it.
+struct Sides<'a> {
+    run: &'a JointRun,
+    side: EncoderSide,
+    rotor: f64,
+    /// What joins the sides; nothing where the drive is rigid.
+    coupling: Option<Coupling>,
+    /// Torque that the motor passes on where it goes with its link, N m (N).
+    motor: Vec<f64>,
+    /// Torque that the link takes, N m (N).
+    link: Vec<f64>,
+    /// What drives the side that is not logged, N m (N), and its inertia, kg m² (kg).
+    driven: (Cow<'a, [f64]>, Cow<'a, [f64]>),
+}
+
+impl<'a> Sides<'a> {
+    fn of(run: &'a JointRun, drive: &Candidate, rotor: f64) -> Sides<'a> {
+        let samples = 0..run.rest.len();
+        let motor: Vec<f64> = samples.clone().map(|k| run.delivered[k] - rotor * run.acceleration[k]).collect();
+        let link: Vec<f64> = samples.map(|k| run.delivered[k] - run.rest[k]).collect();
+        let coupling = Coupling::of(drive);
+        let driven = match (&coupling, drive.side) {
+            (None, _) => (Cow::Owned(Vec::new()), Cow::Owned(Vec::new())),
+            (Some(_), EncoderSide::Motor) => {
+                let smooth: Vec<f64> = link.iter().zip(&run.drag.taken).map(|(link, drag)| link - drag).collect();
+                (Cow::Owned(smooth), Cow::Borrowed(&run.inertia[..]))
+            }
+            (Some(_), EncoderSide::Link) => (Cow::Owned(motor.clone()), Cow::Owned(vec![rotor; motor.len()])),
+        };
+        Sides { run, side: drive.side, rotor, coupling, motor, link, driven }
+    }
+
+    /// The side that is not logged, where it is to be followed: a spring behind a link shows its angle by itself.
+    fn begun(&self) -> Option<Begun<'_>> {
+        let coupling = self.coupling?;
+        let (slope, drag, seen) = match self.side {
+            EncoderSide::Motor => (Some(&self.run.slope[..]), Some(&self.run.drag), &self.motor),
+            EncoderSide::Link if coupling.half_gap > 0.0 && self.rotor > 0.0 => (None, None, &self.link),
+            EncoderSide::Link => return None,
+        };
+        let (drive, inertia) = (&self.driven.0[..], &self.driven.1[..]);
+        let own = Oscillator { drive, inertia, slope, drag, coupling, dt: self.run.dt };
+        Some((own, own.begins(Some(seen)), Some(seen)))
+    }
+
+    /// What is left of the effort, the other side having been followed where that was needed.
+    fn left(&self, ahead: Option<WindUp>) -> Vec<f64> {
+        let samples = 0..self.motor.len();
+        let Some(coupling) = self.coupling else {
+            return samples.map(|k| self.motor[k] - self.link[k]).collect();
+        };
+        let holds = &self.run.drag.holds;
+        let ahead = ahead
+            .unwrap_or_else(|| WindUp::of_motor(&self.motor, &self.link, holds, self.rotor, &coupling, self.run.dt));
+        let passed = ahead.torque(&coupling);
+        match self.side {
+            EncoderSide::Motor => samples.map(|k| self.motor[k] - passed[k]).collect(),
+            EncoderSide::Link => {
+                // Where friction holds the link, what its coupling holds is what the motor passes on.
+                let taken = |k: usize| if holds[k] { passed[k] } else { self.link[k] };
+                samples.map(|k| self.motor[k] - self.rotor * ahead.acceleration[k] - taken(k)).collect()
+            }
+        }
     }
 }
 
@@ -455,6 +324,42 @@ pub(crate) fn inertia_about(model: &Model, data: &mut Data, motion: &Motion, joi
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn oscillators_side_by_side_do_what_each_does_alone() {
+        let samples = 400;
+        let drag = Drag {
+            speed: (0..samples).map(|k| (0.02 * k as f64).sin()).collect(),
+            dry: vec![0.4; samples],
+            viscous: 0.3,
+            taken: vec![0.0; samples],
+            holds: vec![false; samples],
+        };
+        let drives: Vec<Vec<f64>> =
+            (0..11).map(|i| (0..samples - 7 * i).map(|k| (0.05 * (k + i) as f64).cos()).collect()).collect();
+        let inertia = vec![0.2; samples];
+        let all: Vec<Begun<'_>> = (drives.iter().enumerate())
+            .map(|(i, drive)| {
+                let half_gap = if i % 3 == 0 { 0.01 } else { 0.0 };
+                let coupling = Coupling { half_gap, ..Coupling::resonant(0.2, 4.0 + i as f64, 0.05) };
+                let own = Oscillator {
+                    drive,
+                    inertia: &inertia,
+                    slope: None,
+                    drag: (i % 2 == 0).then_some(&drag),
+                    coupling,
+                    dt: 2e-3,
+                };
+                (own, (0.001 * i as f64, 0.1), (i % 4 != 1).then_some(&drive[..]))
+            })
+            .collect();
+        for (together, (own, start, seen)) in follow(&all).into_iter().zip(&all) {
+            let alone = own.from(*start, *seen);
+            assert_eq!(together.angle.len(), own.drive.len());
+            let off = together.angle.iter().zip(&alone.angle).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-12, "{off}");
+        }
+    }
 
     #[test]
     fn a_spring_that_begins_unwound_under_load_is_followed_from_the_first_sample() {
@@ -548,15 +453,16 @@ mod tests {
         let coupling = Coupling { half_gap: 0.01, ..Coupling::resonant(0.2, 20.0, 0.1) };
         let (drive, inertia) = (vec![3.0; 200], vec![0.2; 200]);
         let motor = Oscillator { drive: &drive, inertia: &inertia, slope: None, drag: None, coupling, dt: 2e-3 };
-        let truth = motor.torque_from((-0.0067, 0.12));
+        let torque_from = |start: (f64, f64)| motor.from(start, None).torque(&coupling);
+        let truth = torque_from((-0.0067, 0.12));
         let off = |start: (f64, f64)| -> f64 {
-            motor.torque_from(start).iter().zip(&truth).map(|(torque, truth)| (torque - truth).powi(2)).sum()
+            torque_from(start).iter().zip(&truth).map(|(torque, truth)| (torque - truth).powi(2)).sum()
         };
         let at_rest = (0.01 + 3.0 / coupling.stiffness, 0.0);
         let start = motor.start(&truth, at_rest).unwrap();
         assert!(off(start) < 0.2 * off(at_rest), "{start:?}: {} of {}", off(start), off(at_rest));
         // One that rests under its load stays as it is.
-        let resting = motor.torque_from(at_rest);
+        let resting = torque_from(at_rest);
         assert_eq!(motor.start(&resting, at_rest), Some(at_rest));
     }
 

@@ -22,7 +22,7 @@ const MOVES: usize = 150;
 const SHORTLIST: usize = 6;
 /// Times that the problem is weighed anew, at most.
 const WEIGHINGS: usize = 3;
-/// Part of a joint's effort by which a kind beyond calibration must move it, beside all that the others could do instead.
+/// Part of a joint's effort by which a kind must move it, beside all that the others could do instead.
 const MATERIAL: f64 = 0.003;
 /// Nats that the logs lose where something is missed: what comes in its place must explain as much.
 const MISSED: f64 = 20.0;
@@ -214,11 +214,11 @@ impl<'a> Competition<'a> {
         }
     }
 
-    /// A set without the kinds beyond calibration that move no joint by as much as concerns anyone.
+    /// A set without the kinds that move no joint by as much as concerns anyone.
     fn material(&self, mut set: Vec<usize>) -> Vec<usize> {
         let Some((score, _)) = self.problem.score().settle(&self.problem.columns(&set)) else { return set };
         let Some(with) = score.left(&self.problem.columns(&set)) else { return set };
-        for kind in kinds(self.problem, &set).into_iter().filter(|kind| !kind.is_calibration()) {
+        for kind in kinds(self.problem, &set) {
             let rest = self.without(&set, |c| self.kind(c) == kind);
             let Some(without) = score.left(&self.problem.columns(&rest)) else { continue };
             let moved = |j: usize| without[j] - with[j] > (MATERIAL * self.problem.scale[j]).powi(2);

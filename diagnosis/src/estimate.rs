@@ -153,10 +153,14 @@ impl Fit {
         effects
     }
 
-    /// Half-widths of the 95 % intervals of the coefficients, by what blocks of time tell.
-    pub fn half_widths(&self, problem: &Problem) -> Vec<f64> {
-        let quantile = quantile(problem.blocks_used());
-        problem.covariance(&self.columns, &self.theta).diagonal().iter().map(|v| quantile * v.sqrt()).collect()
+    /// Half-widths of the 95 % intervals of the coefficients: the wider of what blocks of time tell, and parts of the speed of
+    /// any of the `joints`.
+    pub fn half_widths(&self, problem: &Problem, joints: &[usize], speeds: &[Vec<usize>]) -> Vec<f64> {
+        let squares: Vec<DVector<f64>> = std::iter::once(self.over_time(problem))
+            .chain(joints.iter().map(|&j| self.over_speed(problem, &speeds[j])))
+            .map(|all| all.diagonal())
+            .collect();
+        (0..self.columns.len()).map(|i| squares.iter().map(|of| of[i]).fold(0.0, f64::max).sqrt()).collect()
     }
 
     /// Parameters of an effect of a kind made of some candidates under their public names, with 95 % intervals.
@@ -187,9 +191,7 @@ impl Fit {
             let (at, theta) = self.own(problem, c);
             let candidate = &problem.entries[c].candidate;
             for &j in &candidate.joints {
-                over_speed.entry(j).or_insert_with(|| {
-                    problem.covariance_over(&self.columns, &self.theta, &speeds[j]) * quantile(PARTS).powi(2)
-                });
+                over_speed.entry(j).or_insert_with(|| self.over_speed(problem, &speeds[j]));
             }
             // Squares of half-widths.
             let accounts: Vec<DMatrix<f64>> = std::iter::once(&over_time)
@@ -255,6 +257,11 @@ impl Fit {
     /// Squares of half-widths of 95 % intervals of the coefficients, and how they go together, by what blocks of time tell.
     pub fn over_time(&self, problem: &Problem) -> DMatrix<f64> {
         problem.covariance(&self.columns, &self.theta) * quantile(problem.blocks_used()).powi(2)
+    }
+
+    /// The same by what parts of a joint's speed tell; `part` has that of each row of the band.
+    fn over_speed(&self, problem: &Problem, part: &[usize]) -> DMatrix<f64> {
+        problem.covariance_over(&self.columns, &self.theta, part) * quantile(PARTS).powi(2)
     }
 }
 

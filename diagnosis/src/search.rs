@@ -270,15 +270,17 @@ impl Logs<'_> {
         Ok(chosen)
     }
 
-    /// What was chosen without the candidates beyond calibration of which every interval holds nothing: what blocks of time do
-    /// not agree on was not shown by them. Where nothing of a kind is left, what else there is has its turn without it.
+    /// What was chosen without the candidates of which every interval holds nothing: what blocks of time do not agree on was
+    /// not shown by them. Links stay, of which the URDF says what they may be. Where nothing of a kind is left, what else there is has its turn without it.
     fn shown(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let speeds = speeds(&self.signals, &self.band, self.model.dof());
         for kind in climb::kinds(&chosen.all, &chosen.choice.set) {
-            if kind.is_calibration() || kind.is_outside() {
+            if kind == Kind::LinkInertiaError || kind.is_outside() {
                 continue;
             }
-            let half = chosen.fit.half_widths(&chosen.exact);
             let holds_nothing = |i: usize| {
+                let joints = &chosen.exact.entries[i].candidate.joints;
+                let half = chosen.fit.half_widths(&chosen.exact, joints, &speeds);
                 let (at, theta) = chosen.fit.own(&chosen.exact, i);
                 at.iter().zip(theta).all(|(&i, theta)| theta.abs() < half[i])
             };

@@ -2,6 +2,7 @@
 
 use crate::band::Band;
 use crate::climb::{self, LATE, Rival};
+use crate::combinations::combinations;
 use crate::corrected::{Corrected, MODEL_SCHEMA, plant, plant_pushed, residual};
 use crate::covariance::covariance;
 use crate::estimate::{Fit, speeds};
@@ -416,6 +417,7 @@ impl Logs<'_> {
             power: power::power(model, &chosen.all, &chosen.choice.set, &drives),
             effects: found,
             covariance,
+            combinations: combinations(problem, fit, model),
             alternatives: alternatives(&chosen.all, rivals),
             why: self.why(chosen, rivals),
             unexplained: Unexplained {
@@ -496,7 +498,8 @@ impl Logs<'_> {
             told.push((effect, of_it));
         }
         // Strongest first: by what the best explanation without it leaves.
-        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let alone = |effect: &FoundEffect| effect.shrink.torque.unwrap_or(0.0);
+        found.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| alone(&b.1).total_cmp(&alone(&a.1))));
         let covariance = covariance(self.model, &fit.over_time(problem), &told);
         Ok((found.into_iter().map(|(_, effect)| effect).collect(), covariance))
     }
@@ -568,6 +571,7 @@ impl Logs<'_> {
             },
             effects: Vec::new(),
             covariance: None,
+            combinations: Vec::new(),
             alternatives: Vec::new(),
             why: Vec::new(),
             unexplained: Unexplained { fraction: 0.0, learnable: 0.0, resembles: None, regimes: Vec::new() },

@@ -11,6 +11,7 @@ mod bootstrap;
 mod break_away;
 mod ceiling;
 mod climb;
+mod combinations;
 mod contact;
 mod corrected;
 mod covariance;

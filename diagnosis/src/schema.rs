@@ -31,6 +31,9 @@ pub struct Diagnosis {
     pub gap: Gap,
     /// Which effects cause it, strongest first; empty for `no_gap`.
     pub effects: Vec<FoundEffect>,
+    /// What the logs determine of bodies, surest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub combinations: Vec<Combination>,
     /// Other sets of effects that the logs do not exclude.
     pub alternatives: Vec<Alternative>,
     /// The comparisons that decided.
@@ -293,6 +296,29 @@ pub struct EffectShrink {
     /// 95 % interval of `torque`; `None` where it is, or where there are too few blocks of time to tell.
     #[serde(default)]
     pub ci95: Option<[f64; 2]>,
+}
+
+/// A sum over parameters of bodies that the logs determine, where they may leave each of these open.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Combination {
+    /// What it is, in words.
+    pub words: String,
+    /// Its parts, `<parameter>.<joint>`, each with the factor that it counts by: differences of the link that the joint moves,
+    /// with what it carries, from the URDF; the link's frame, inertia about its origin.
+    pub terms: BTreeMap<String, f64>,
+    /// Its value.
+    pub value: f64,
+    /// 95 % interval.
+    pub ci95: [f64; 2],
+    /// Its unit.
+    pub unit: String,
+}
+
+impl Combination {
+    /// Whether its interval leaves out zero: whether bodies differ from the URDF in it.
+    pub fn differs(&self) -> bool {
+        self.ci95[0] > 0.0 || self.ci95[1] < 0.0
+    }
 }
 
 /// Another set of effects that could be behind the gap.

@@ -68,7 +68,7 @@ pub use dormand_prince::{Adaptive, Dense, DormandPrince, StepError};
 pub use finding::Finding;
 pub use inverse::invert;
 pub use mjcf::MjcfError;
-pub use model::{GRAVITY, Inertia, Joint, JointKind, Limits, Model, ModelError, Placement};
+pub use model::{GRAVITY, Inertia, InertialSource, Joint, JointKind, Limits, Model, ModelError, Placement};
 pub use real::LANES;
 pub use step::{StepModel, central_differences};
 pub use transitions::Transitions;

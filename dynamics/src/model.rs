@@ -126,6 +126,18 @@ pub enum ModelError {
     },
 }
 
+/// Where the inertial parameters of a link come from: how far they may be from the true ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum InertialSource {
+    /// Weighed and balanced, or identified.
+    Weighed,
+    /// Computed from the drawing, as those of most robot descriptions.
+    #[default]
+    Cad,
+    /// Guessed, or left at what a tool wrote.
+    Guessed,
+}
+
 /// A robot arm on a fixed base: a tree of joints with their links, gravity, and rotor inertias. Immutable once built.
 ///
 /// World is the base link's frame. The state is `q` (rad or m) and `v` (rad/s or m/s), one number a joint, in the
@@ -137,6 +149,7 @@ pub struct Model {
     joints: Vec<Joint>,
     gravity: DVec3,
     armature: Vec<f64>,
+    sources: Vec<InertialSource>,
     segments: Segments,
 }
 
@@ -166,7 +179,8 @@ impl Model {
         }
         let armature = vec![0.0; joints.len()];
         let segments = Segments::new(&joints, GRAVITY, &armature);
-        Ok(Self { name, base, joints, gravity: GRAVITY, armature, segments })
+        let sources = vec![InertialSource::default(); joints.len()];
+        Ok(Self { name, base, joints, gravity: GRAVITY, armature, sources, segments })
     }
 
     /// The robot's name.
@@ -230,6 +244,24 @@ impl Model {
         assert_eq!(armature.len(), self.dof(), "one armature a joint");
         self.armature.copy_from_slice(armature);
         self.prepared()
+    }
+
+    /// Where the inertial parameters of the link that `joint` moves come from. No equation of motion uses it.
+    ///
+    /// # Panics
+    /// If `joint` is not less than [`Model::dof`].
+    pub fn inertial_source(&self, joint: usize) -> InertialSource {
+        self.sources[joint]
+    }
+
+    /// The same model with another source of the inertial parameters of the link that `joint` moves.
+    ///
+    /// # Panics
+    /// If `joint` is not less than [`Model::dof`].
+    #[must_use]
+    pub fn with_inertial_source(mut self, joint: usize, source: InertialSource) -> Self {
+        self.sources[joint] = source;
+        self
     }
 
     /// The model as the kernels see it.

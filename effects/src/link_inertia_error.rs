@@ -5,7 +5,7 @@
 
 use crate::effect::{Law, Value, check};
 use crate::{EffectError, Kind, Plant};
-use gapscope_dynamics::{Inertia, Model};
+use gapscope_dynamics::{Inertia, InertialSource, Model};
 use serde::{Deserialize, Serialize};
 
 /// Differences of a link's inertial parameters, frame of the link, inertia about its origin.
@@ -71,12 +71,16 @@ impl LinkInertiaError {
     }
 }
 
-/// What a link may be off by from its URDF, as standard deviations: mass, as a part of it, ...
+/// What a link whose inertials come from CAD may be off by, as standard deviations: mass, as a part of it, ...
 const MASS: f64 = 0.15;
 /// ... centre of mass, m, ...
 const CENTER: f64 = 0.015;
 /// ... and inertia, as a part of it.
 const INERTIA: f64 = 0.3;
+/// How many times as far off links may be that were weighed, ...
+const WEIGHED: f64 = 0.2;
+/// ... and those whose inertials were guessed: by six tenths of the mass, and 6 cm.
+const GUESSED: f64 = 4.0;
 /// Least mass that a link is taken to have, as a part of the robot's: some URDFs have links without inertia.
 const LEAST: f64 = 0.01;
 
@@ -90,7 +94,12 @@ pub(crate) fn scales(model: &Model, joint: usize) -> Vec<f64> {
     let moment = mass * CENTER.hypot(MASS * lever);
     let rotational = (body.rotational.x_axis.x + body.rotational.y_axis.y + body.rotational.z_axis.z).max(0.0);
     let inertia = INERTIA * rotational + mass * CENTER * (CENTER + 2.0 * lever);
-    [&[MASS * mass][..], &[moment; 3], &[inertia; 6]].concat()
+    let times = match model.inertial_source(joint) {
+        InertialSource::Weighed => WEIGHED,
+        InertialSource::Cad => 1.0,
+        InertialSource::Guessed => GUESSED,
+    };
+    [&[MASS * mass][..], &[moment; 3], &[inertia; 6]].concat().into_iter().map(|scale| times * scale).collect()
 }
 
 /// The error with these ten coefficients of the link's regressor.
@@ -113,11 +122,16 @@ mod tests {
         let model = robots::model("arm6").unwrap().unwrap().model;
         let total: f64 = model.joints().iter().map(|j| j.inertia.mass).sum();
         for j in 0..model.dof() {
-            let scales = scales(&model, j);
-            assert!(scales.iter().all(|s| s.is_finite() && *s > 0.0), "{j}: {scales:?}");
-            assert_eq!(scales[0], MASS * model.joints()[j].inertia.mass.max(LEAST * total));
+            let own = scales(&model, j);
+            assert!(own.iter().all(|s| s.is_finite() && *s > 0.0), "{j}: {own:?}");
+            assert_eq!(own[0], MASS * model.joints()[j].inertia.mass.max(LEAST * total));
+        }
+        let known = model.clone().with_inertial_source(2, InertialSource::Weighed);
+        let guessed = model.clone().with_inertial_source(2, InertialSource::Guessed);
+        for ((known, own), guessed) in scales(&known, 2).iter().zip(scales(&model, 2)).zip(scales(&guessed, 2)) {
+            assert_eq!((*known, guessed), (WEIGHED * own, GUESSED * own));
         }
         let bare = model.clone().with_inertia(2, Inertia::from_parameters(&[0.0; 10]));
-        assert!(super::scales(&bare, 2).iter().all(|s| *s > 0.0));
+        assert!(scales(&bare, 2).iter().all(|s| *s > 0.0));
     }
 }

@@ -128,6 +128,9 @@ pub struct Diagnose {
     /// What is known of the servos, where logs hold no torque: gains, constants, limits, as numbers or ranges (TOML)
     #[arg(long, value_name = "FILE")]
     pub drive: Option<PathBuf>,
+    /// How well the links' inertials are known: weighed, cad (the default) or guessed; or one link's, e.g. `link6=weighed`
+    #[arg(long, value_name = "[LINK=]SOURCE")]
+    pub trust: Vec<String>,
     /// Print what was proposed, against what, and by how much the logs spoke for or against it
     #[arg(long)]
     pub why: bool,

@@ -4,6 +4,7 @@ use crate::cli::{Diagnose, Input};
 use crate::input::{Loaded, load_any};
 use crate::report::Setting;
 use crate::report::terminal::Paint;
+use crate::trust::trusting;
 use crate::{output, report, servo, summary};
 use anyhow::{Context, Result};
 use gapscope_datasets::Bound;
@@ -51,7 +52,8 @@ pub enum Found {
 /// Bad input.
 pub fn found(args: &Diagnose, progress: Told<'_>) -> Result<Found> {
     progress("reading robot and logs", 0.0);
-    let loaded = load_any(&args.input, Some(Bound::DIAGNOSIS), &|word| progress(word, 0.0))?;
+    let mut loaded = load_any(&args.input, Some(Bound::DIAGNOSIS), &|word| progress(word, 0.0))?;
+    loaded.model = trusting(loaded.model, &args.trust)?;
     if servo::lacks_effort(&loaded) {
         return Ok(Found::Servo(Box::new(servo::diagnosed(args, loaded, progress)?)));
     }

@@ -24,6 +24,7 @@ mod shell;
 mod study;
 mod summary;
 pub mod train;
+mod trust;
 mod withheld;
 
 use cli::Command;

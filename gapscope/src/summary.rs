@@ -4,7 +4,7 @@
 mod change;
 
 use crate::input::fault_line;
-use crate::report::plain;
+use crate::report::plain::{self, combination, together};
 use crate::report::terminal::{INDENT, Paint, block, blocks, clean, column, fill, pad, wrap};
 use crate::report::{
     NONE, capital, changed, count, effect, estimate, figure, headline, implied_unit, interval, is_above_floor,
@@ -21,6 +21,7 @@ use std::path::Path;
 /// Effects, regimes, rollouts and findings shown; the rest is counted.
 const EFFECTS: usize = 5;
 const REGIMES: usize = 3;
+const SUMS: usize = 4;
 const FINDINGS: usize = 3;
 const LOGS: usize = 12;
 /// A rollout further than this from its log, rad or m, goes nowhere.
@@ -187,7 +188,8 @@ fn which(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
         };
         return vec![text.into()];
     }
-    let shown = &diagnosis.effects[..diagnosis.effects.len().min(EFFECTS)];
+    let effects = together(diagnosis);
+    let shown = &effects[..effects.len().min(EFFECTS)];
     let name = |e: &FoundEffect| capital(&effect(&e.kind));
     let place = |e: &FoundEffect| joint_list(&e.joints, &diagnosis.joints);
     let names: Vec<String> = shown.iter().map(name).collect();
@@ -201,11 +203,18 @@ fn which(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
             None => String::new(),
         };
         let line = format!("{}  {:>4} % sure{alone}", pad(place, second), probability_figure(found.confidence));
+        let name = paint.bold(&pad(name, first));
+        // Of a link alone, logs tell little.
+        if of_links(diagnosis, &found.kind) {
+            rows.push(format!("{name}  {line}"));
+            let sums = diagnosis.combinations.iter().filter(|sum| sum.differs()).take(SUMS);
+            rows.extend(sums.map(|sum| format!("  {}", clean(&combination(sum)))));
+            continue;
+        }
         let details: Vec<String> =
             found.parameters.iter().filter_map(|(name, p)| value(&found.kind, name, p)).collect();
         let details = details.join("; ");
         let columns = INDENT + first + 4 + line.chars().count();
-        let name = paint.bold(&pad(name, first));
         if columns + details.chars().count() <= paint.width {
             rows.push(format!("{name}  {line}  {details}"));
         } else {
@@ -213,7 +222,12 @@ fn which(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
             rows.push(format!("  {details}"));
         }
     }
-    rest(rows, diagnosis.effects.len(), EFFECTS, "effect")
+    rest(rows, effects.len(), EFFECTS, "effect")
+}
+
+/// Whether a kind says how links differ from the URDF.
+fn of_links(diagnosis: &Diagnosis, kind: &str) -> bool {
+    diagnosis.effects.iter().any(|effect| effect.kind == kind && effect.parameters.contains_key("mass_delta"))
 }
 
 /// `static friction 0.42–1.51 N m, each ± 0.04 or less`; vectors are left to the report.

@@ -3,10 +3,10 @@
 //! The terminal and the page begin with these very words.
 
 use super::answer::largest;
-use super::format::{count, estimate, figure, percent, span, with_unit};
+use super::format::{count, estimate, figure, percent, significant, span, with_unit};
 use super::words;
 use gapscope_datasets::Fault;
-use gapscope_diagnosis::schema::{Diagnosis, FoundEffect, Parameter, Verdict};
+use gapscope_diagnosis::schema::{Combination, Diagnosis, FoundEffect, Parameter, Verdict};
 
 /// Effects that the first sentence names beside the strongest.
 const FURTHER: usize = 2;
@@ -31,7 +31,8 @@ fn cause(diagnosis: &Diagnosis) -> String {
 
 /// The strongest effect in a clause, the next by name, the rest by number.
 fn effects(diagnosis: &Diagnosis) -> String {
-    let [first, rest @ ..] = diagnosis.effects.as_slice() else { return String::new() };
+    let effects = together(diagnosis);
+    let [first, rest @ ..] = effects.as_slice() else { return String::new() };
     let mut named: Vec<String> = rest
         .iter()
         .take(FURTHER)
@@ -44,11 +45,42 @@ fn effects(diagnosis: &Diagnosis) -> String {
         named.push(count(rest.len() - FURTHER, "weaker effect"));
     }
     let also = if named.is_empty() { String::new() } else { format!(" Beside it: {}.", words::list(&named, "and")) };
-    format!("{}.{also}", clause(first, &diagnosis.joints))
+    format!("{}.{also}", clause(first, diagnosis))
+}
+
+/// The effects as they are read: links that differ are one thing, as their torques are, of which the logs tell the sums.
+pub fn together(diagnosis: &Diagnosis) -> Vec<FoundEffect> {
+    let mut read: Vec<FoundEffect> = Vec::new();
+    for effect in &diagnosis.effects {
+        let alike =
+            |other: &&mut FoundEffect| other.kind == effect.kind && effect.parameters.contains_key("mass_delta");
+        let Some(other) = read.iter_mut().find(alike) else {
+            read.push(effect.clone());
+            continue;
+        };
+        other.joints.extend(effect.joints.iter().cloned());
+        other.joints.sort_by_key(|joint| diagnosis.joints.iter().position(|of| of == joint));
+        other.confidence = other.confidence.min(effect.confidence);
+        other.indistinguishable_from.extend(effect.indistinguishable_from.iter().cloned());
+        other.indistinguishable_from.sort();
+        other.indistinguishable_from.dedup();
+        // Neither values nor the shrink of one link are those of all.
+        other.parameters.clear();
+        other.shrink.torque = None;
+    }
+    read
+}
+
+/// `mass of link5 and all it carries off by −0.76 ± 0.04 kg`.
+pub fn combination(sum: &Combination) -> String {
+    let (value, half) = (sum.value, 0.5 * (sum.ci95[1] - sum.ci95[0]));
+    let (value, half) = (significant(value, 3), significant(half, 2));
+    format!("{} off by {}", sum.words, with_unit(&format!("{value} ± {half}"), &sum.unit))
 }
 
 /// `joint3 rubs: 2.1 N m of dry friction that the model lacks`.
-fn clause(effect: &FoundEffect, all: &[String]) -> String {
+fn clause(effect: &FoundEffect, diagnosis: &Diagnosis) -> String {
+    let all = &diagnosis.joints;
     let place = words::joints(&effect.joints, all);
     let (subject, several) = match effect.joints.as_slice() {
         [] => ("The robot".to_owned(), false),
@@ -73,6 +105,12 @@ fn clause(effect: &FoundEffect, all: &[String]) -> String {
         "actuation_delay" => lacking(verb("acts", "act") + " late", size("delay"), "delay"),
         "actuator_lag" => lacking(verb("follows", "follow") + " with a lag", size("time_constant"), "lag"),
         "backlash" => lacking(verb("has", "have") + " play", size("gap"), "play"),
+        "link_inertia_error" => {
+            let links = if several { "The links of" } else { "The link of" };
+            let surest = diagnosis.combinations.iter().find(|sum| sum.differs());
+            let size = surest.map_or(String::new(), |sum| format!(": {}", combination(sum)));
+            format!("{links} {place} {} not as the model has {}{size}", verb("is", "are"), verb("it", "them"))
+        }
         "gravity_misalignment" => "The base is tilted, and the model takes it to be level".into(),
         "torque_gain_error" => {
             let gain = size("gain").map_or(String::new(), |gain| format!("{gain} times "));

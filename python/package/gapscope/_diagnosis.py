@@ -22,11 +22,19 @@ if TYPE_CHECKING:
     from ._plot import Plots
 
 
+def _trust(trust: Union[str, Mapping[str, str], None]) -> Optional[list[str]]:
+    """What the command line says of links."""
+    if isinstance(trust, Mapping):
+        return [f"{link}={source}" for link, source in trust.items()]
+    return None if trust is None else [trust]
+
+
 def diagnose(
     model: Robot,
     logs: Logs,
     *,
     drive: Union[str, "os.PathLike[str]", None] = None,
+    trust: Union[str, Mapping[str, str], None] = None,
     progress: Progress = None,
     **options: Any,
 ) -> Diagnosis:
@@ -39,6 +47,8 @@ def diagnose(
             `effort.<joint>`, … (T,) each, or with whole quantities `time` (T,), `position` (T, n), `effort` (T, n), … and
             `joints` where they are not in the robot's order. Units: s, rad, rad/s, N m (m, m/s, N). One or several.
         drive: path of a TOML file with what is known of the servos, where logs hold no torque.
+        trust: how well the links' inertials are known: "weighed", "cad" (the default) or "guessed"; or a mapping from links to
+            these.
         progress: True for a line on standard error, False for none, or a function `(stage, part)` with part from 0 to 1;
             by default a line in a terminal and in a notebook.
         options: those of the command line by name: `map` (a mapping), `map_file`, `topic`, `episodes`, `calibration`,
@@ -51,7 +61,7 @@ def diagnose(
     told = teller(progress)
     try:
         with given(model, logs, options) as arguments:
-            files, summary, why, sentences = _native.diagnose(arguments, _flags(drive=drive), told)
+            files, summary, why, sentences = _native.diagnose(arguments, _flags(drive=drive, trust=_trust(trust)), told)
             robot = _Robot.of(arguments)
     finally:
         clear(told)

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 mod bank_sample;
+mod bodies;
 mod book;
 mod break_away;
 mod diagnosis;

@@ -2,12 +2,13 @@
 
 use gapscope_datasets::{Recipe, generate};
 use gapscope_diagnosis::schema::FoundEffect;
+use gapscope_dynamics::InertialSource;
 use gapscope_effects::{CoulombFriction, Effect, Payload};
 use gapscope_tests::{diagnose, robot};
 
-/// The body found where the last link of an arm, of .365 kg, carries `mass`, kg, in its centre.
-fn body_found(mass: f64) -> FoundEffect {
-    let model = robot("arm6");
+/// The body found where the last link of an arm, of .365 kg from `source`, carries `mass`, kg, in its centre.
+fn body_found(mass: f64, source: InertialSource) -> FoundEffect {
+    let model = robot("arm6").with_inertial_source(5, source);
     let last = model.joints().last().unwrap();
     let com = (last.inertia.first_moment / last.inertia.mass).to_array();
     let load = Payload { joint: last.name.clone(), mass, com, inertia: [0.0; 6] };
@@ -23,11 +24,17 @@ fn body_found(mass: f64) -> FoundEffect {
 /// A last link that is off by as much as links are is likelier than a load; one that is off by its mass several times is not.
 #[test]
 fn a_light_load_could_be_the_last_link_and_a_heavy_one_could_not() {
-    let light = body_found(0.05);
+    let light = body_found(0.05, InertialSource::Cad);
     assert_eq!(
         (light.kind.as_str(), &light.indistinguishable_from[..]),
         ("link_inertia_error", &["payload".to_owned()][..])
     );
-    let heavy = body_found(1.0);
+    let heavy = body_found(1.0, InertialSource::Cad);
     assert_eq!((heavy.kind.as_str(), heavy.indistinguishable_from.len()), ("payload", 0), "{heavy:#?}");
+}
+
+#[test]
+fn beside_a_link_that_was_weighed_a_light_load_is_a_load() {
+    let load = body_found(0.05, InertialSource::Weighed);
+    assert_eq!((load.kind.as_str(), load.indistinguishable_from.len()), ("payload", 0), "{load:#?}");
 }

@@ -78,6 +78,7 @@ pub fn explained() -> Case {
         verdict: Verdict::Explained,
         gap: gap(&names, &rms, regimes(&names)),
         effects: vec![coulomb_effect, payload, viscous_effect, delay],
+        combinations: Vec::new(),
         alternatives: vec![
             Alternative { effects: vec!["stribeck_friction".into(), "payload".into()], probability: 0.11 },
             Alternative { effects: vec!["coulomb_friction".into(), "link_inertia_error".into()], probability: 0.02 },

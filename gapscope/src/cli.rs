@@ -306,12 +306,14 @@ pub enum Study {
     Policy(Learning),
     /// Logs of real machines: what is found, against what was published
     RealLogs(RealLogs),
+    /// Several logs of one machine, each diagnosed alone: whether the answers agree
+    Agreement(RealLogs),
 }
 
-/// Arguments of `study real-logs`.
+/// Arguments of the studies of logs of real machines.
 #[derive(Debug, Args)]
 pub struct RealLogs {
-    /// Folder of the logs, a folder each: emps, tx40, kinova_gen3, double_pendulum
+    /// Folder of the logs, a folder each: emps, tx40, kinova_gen3, double_pendulum, kuka_lwr4
     #[arg(long, value_name = "DIR")]
     pub data: PathBuf,
     /// Folder for the pages and their pictures

@@ -12,7 +12,6 @@ use crate::report::implied_unit;
 use anyhow::{Context, Result, bail};
 use figures::{Agreement, Lost, Reach, agreement};
 use gapscope_datasets::{Bound, Episode};
-use gapscope_diagnosis::schema::Change;
 use gapscope_diagnosis::{Outcome, Predictions, evaluate};
 use gapscope_dynamics::Model;
 use machines::{Half, MACHINES, Machine, Source};
@@ -70,6 +69,8 @@ struct Run {
     model: Model,
     episodes: Vec<Episode>,
     outcome: Outcome,
+    /// Rms of what its own correction leaves of each joint's effort, N m or N.
+    left: Vec<f64>,
 }
 
 impl Run {
@@ -82,7 +83,9 @@ impl Run {
         }
         let (model, episodes) = (loaded.model.clone(), loaded.episodes.clone());
         let (outcome, _) = diagnosed(loaded, &input, &|_, _| {})?;
-        Ok(Run { name: source.label(), model, episodes, outcome })
+        let (_, own) = evaluate(&model, &episodes, Some(&outcome.corrected))?;
+        let left = left(&own, model.dof());
+        Ok(Run { name: source.label(), model, episodes, outcome, left })
     }
 }
 
@@ -108,22 +111,19 @@ fn halved(episodes: &[Episode], half: Half) -> Vec<Episode> {
 /// What the correction from one log reaches on another, beside what that one's own diagnosis reaches there.
 fn reach(runs: &[Run], [from, on]: [usize; 2]) -> Result<Reach> {
     let (giver, taker) = (&runs[from], &runs[on]);
-    let torque = |run: &Run| evaluate(&taker.model, &taker.episodes, Some(&run.outcome.corrected));
-    let (evaluation, predictions) = torque(giver)?;
-    let (_, own) = torque(taker)?;
+    let (evaluation, predictions) = evaluate(&taker.model, &taker.episodes, Some(&giver.outcome.corrected))?;
     let change = evaluation.shrink.context("a corrected model gives a shrink")?.torque;
     let weights = &giver.outcome.corrected.weights;
-    let joints = taker.model.joints().iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
-    let weight = |joint: &String| weights.get(joint).copied().unwrap_or(0.0);
     let regimes = &taker.outcome.diagnosis.gap.regimes;
-    let [left, own] = [left(&predictions, joints.len()), left(&own, joints.len())];
-    let lost = joints.iter().zip(left.into_iter().zip(own)).map(|(joint, (left, own))| {
-        let more = weight(joint).powi(2) * (left * left - own * own);
-        (more, Lost { joint: joint.clone(), left, own, unit: implied_unit(joint, regimes) })
+    let left = left(&predictions, taker.model.dof());
+    let lost = taker.model.joints().iter().zip(left.into_iter().zip(&taker.left)).map(|(joint, (left, &own))| {
+        let weight = weights.get(&joint.name).copied().unwrap_or(0.0);
+        let lost = Lost { joint: joint.name.clone(), left, own, unit: implied_unit(&joint.name, regimes) };
+        (weight.powi(2) * (left * left - own * own), lost)
     });
     let most = lost.filter(|(more, _)| *more > 0.0).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, lost)| lost);
-    let part = |change: &Change| change.shrink;
-    Ok(Reach::new([from, on], part(&change), part(&taker.outcome.diagnosis.shrink.torque), most))
+    let own = taker.outcome.diagnosis.shrink.torque.shrink;
+    Ok(Reach::new([from, on], change.shrink, own, most))
 }
 
 /// Rms of what a corrected model leaves of each joint's effort, N m or N.

@@ -1,6 +1,7 @@
 //! The arithmetic of agreement.
 
 use crate::compare::{Row, Told, compare, results_of};
+use crate::report::verdict;
 use gapscope_diagnosis::schema::Diagnosis;
 use std::collections::BTreeMap;
 
@@ -24,6 +25,8 @@ pub struct Agreement {
     pub judged: bool,
     /// Its logs.
     pub logs: Vec<String>,
+    /// The verdict on each, in words.
+    pub verdicts: Vec<&'static str>,
     /// The kinds that any log gives, those that all give first.
     pub kinds: Vec<Kind>,
     /// The parameters of each pair of logs.
@@ -119,6 +122,7 @@ pub fn agreement(
         machine: machine.to_owned(),
         judged,
         logs: logs.to_vec(),
+        verdicts: diagnoses.iter().map(|diagnosis| verdict(diagnosis.verdict)).collect(),
         kinds: kinds(diagnoses),
         differences,
         reaches,
@@ -434,6 +438,7 @@ mod tests {
             "**arm: on two the correction from one reaches 50\u{a0}% of the own shrink.**",
             "Most is lost at b: it leaves 2.00\u{a0}N\u{a0}m rms there, the own one 0.500\u{a0}N\u{a0}m.",
             "**arm: on one its own diagnosis shrinks nothing that was held out.**",
+            "| *verdict* | Explained | Explained | Explained |",
             "| three | one | 50\u{a0}% | 0\u{a0}% | – |",
         ] {
             assert!(page.contains(said), "{said}\n{page}");

@@ -181,17 +181,14 @@ fn machine(one: &Agreement) -> String {
     if !one.judged {
         text.push_str("These logs are too short to be judged.\n\n");
     }
-    if one.kinds.is_empty() {
-        text.push_str("No log gives an effect.\n\n");
-    } else {
-        let rule: String = one.logs.iter().map(|_| "---|").collect();
-        let _ = writeln!(text, "| kind | {} |\n|---|{rule}", one.logs.join(" | "));
-        for kind in &one.kinds {
-            let cells: Vec<String> = kind.given.iter().map(cell).collect();
-            let _ = writeln!(text, "| {} | {} |", effect(&kind.name), cells.join(" | "));
-        }
-        text.push('\n');
+    let rule: String = one.logs.iter().map(|_| "---|").collect();
+    let _ = writeln!(text, "| kind | {} |\n|---|{rule}", one.logs.join(" | "));
+    let _ = writeln!(text, "| *verdict* | {} |", one.verdicts.join(" | "));
+    for kind in &one.kinds {
+        let cells: Vec<String> = kind.given.iter().map(cell).collect();
+        let _ = writeln!(text, "| {} | {} |", effect(&kind.name), cells.join(" | "));
     }
+    text.push('\n');
     let parameters = one.parameters();
     if !parameters.is_empty() {
         text.push_str("| effect | parameter | within two joint standard errors | median difference, joint standard errors | median size | median half of the 95\u{a0}% interval |\n|---|---|--:|--:|--:|--:|\n");

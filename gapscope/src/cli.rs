@@ -72,6 +72,8 @@ pub enum Withheld {
     Make(MakeBank),
     /// Diagnose the cases of banks, then open the sealed truth
     Score(ScoreBank),
+    /// Hold the confidence that answers state against the sealed truth, and say which map from odds to probability fits
+    Calibrate(CalibrateBank),
 }
 
 /// Which robot and logs.
@@ -309,12 +311,14 @@ pub enum Study {
     Policy(Learning),
     /// Logs of real machines: what is found, against what was published
     RealLogs(RealLogs),
+    /// Several logs of one machine, each diagnosed alone: whether the answers agree
+    Agreement(RealLogs),
 }
 
-/// Arguments of `study real-logs`.
+/// Arguments of the studies of logs of real machines.
 #[derive(Debug, Args)]
 pub struct RealLogs {
-    /// Folder of the logs, a folder each: emps, tx40, kinova_gen3, double_pendulum
+    /// Folder of the logs, a folder each: emps, tx40, kinova_gen3, double_pendulum, kuka_lwr4
     #[arg(long, value_name = "DIR")]
     pub data: PathBuf,
     /// Folder for the pages and their pictures
@@ -619,13 +623,10 @@ pub enum Level {
     Mixed,
 }
 
-/// Arguments of `withheld score`.
+/// How the cases of banks are diagnosed.
 #[derive(Debug, Args)]
-pub struct ScoreBank {
-    /// Folders of cases, counted apart and together; what is sealed lies in a folder beside each, `.sealed` behind its name
-    #[arg(required = true, value_name = "BANK")]
-    pub banks: Vec<PathBuf>,
-    /// Binary to score [default: this one]
+pub struct Trials {
+    /// Binary that diagnoses [default: this one]
     #[arg(long, value_name = "FILE")]
     pub exe: Option<PathBuf>,
     /// Cases diagnosed at the same time [default: one per core]
@@ -634,6 +635,37 @@ pub struct ScoreBank {
     /// Longest time that a diagnosis may take, s
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 600.0)]
     pub timeout: f64,
+}
+
+/// Arguments of `withheld calibrate`.
+#[derive(Debug, Args)]
+pub struct CalibrateBank {
+    /// Folders of cases; what is sealed lies in a folder beside each, `.sealed` behind its name
+    #[arg(required = true, value_name = "BANK")]
+    pub banks: Vec<PathBuf>,
+    /// Read the diagnoses from DIR/BANK/CASE/diagnosis.json, as `withheld score --keep` leaves them, instead of making them
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["exe", "jobs", "timeout"])]
+    pub answers: Option<PathBuf>,
+    /// How the cases are diagnosed
+    #[command(flatten)]
+    pub how: Trials,
+    /// Print one JSON object and nothing else
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `withheld score`.
+#[derive(Debug, Args)]
+pub struct ScoreBank {
+    /// Folders of cases, counted apart and together; what is sealed lies in a folder beside each, `.sealed` behind its name
+    #[arg(required = true, value_name = "BANK")]
+    pub banks: Vec<PathBuf>,
+    /// How the cases are diagnosed
+    #[command(flatten)]
+    pub how: Trials,
+    /// Keep each diagnosis, as DIR/BANK/CASE/diagnosis.json, for `withheld calibrate --answers`
+    #[arg(long, value_name = "DIR")]
+    pub keep: Option<PathBuf>,
     /// Print one JSON object and nothing else
     #[arg(long)]
     pub json: bool,

@@ -151,7 +151,11 @@ pub fn with_progress(loaded: Loaded, input: &Input) -> Result<(Outcome, Setting)
     found
 }
 
-fn diagnosed(loaded: Loaded, input: &Input, progress: Told<'_>) -> Result<(Outcome, Setting)> {
+/// Diagnoses what is loaded, telling `progress` of each stage.
+///
+/// # Errors
+/// None that a log can cause.
+pub(crate) fn diagnosed(loaded: Loaded, input: &Input, progress: Told<'_>) -> Result<(Outcome, Setting)> {
     let Loaded { model, episodes, findings, faults, doubts, origin, description, held } = loaded;
     let mut outcome = diagnose(&model, &episodes, findings, progress)?;
     outcome.within_physics(&model);

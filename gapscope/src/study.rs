@@ -1,5 +1,6 @@
 //! `gapscope study`: studies that run by one command each.
 
+mod agreement;
 mod closed_loop;
 mod learning;
 mod real_logs;
@@ -19,6 +20,7 @@ pub fn run(study: &Study) -> Result<String> {
         Study::Region(args) => learning::run(Topic::Region, args),
         Study::Structure(args) => learning::run(Topic::Structure, args),
         Study::Policy(args) => learning::run(Topic::Policy, args),
+        Study::Agreement(args) => agreement::run(args),
         Study::RealLogs(args) => real_logs::run(args),
     }
 }

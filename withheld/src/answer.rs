@@ -19,6 +19,9 @@ pub struct Answer {
     /// What it says of the data.
     #[serde(default)]
     pub data: Said,
+    /// The comparisons that decided: what was proposed, at which joints, by how many nats, and whether it was taken.
+    #[serde(default)]
+    pub why: Vec<Value>,
 }
 
 /// What an answer says of the data.
@@ -52,6 +55,21 @@ pub struct Named {
     /// Kinds that the log cannot tell from this one, likeliest first.
     #[serde(default)]
     pub indistinguishable_from: Vec<String>,
+}
+
+impl Answer {
+    /// The least odds of the comparisons that took a named effect, nats; `None` where none is told. A comparison without
+    /// joints is of all of them.
+    pub fn odds(&self, named: &Named) -> Option<f64> {
+        let of = |line: &Value| {
+            let same = line.get("proposed")?.as_str()? == named.kind && line.get("taken")?.as_bool()?;
+            let joints = line.get("joints").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+            let own = |joint: &Value| joint.as_str().is_some_and(|joint| named.joints.iter().any(|own| own == joint));
+            let there = joints.is_empty() || joints.iter().any(own);
+            (same && there).then(|| line.get("odds")?.as_f64()).flatten()
+        };
+        self.why.iter().filter_map(of).min_by(f64::total_cmp)
+    }
 }
 
 fn sure() -> f64 {

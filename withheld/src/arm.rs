@@ -109,7 +109,7 @@ pub(crate) fn part(effect: &SealedEffect, used: Used) -> Part {
 }
 
 /// Whether an answer names an effect as further; one that does not say goes by its kind.
-fn is_further(named: &Named) -> bool {
+pub(crate) fn is_further(named: &Named) -> bool {
     match named.part {
         Some(part) => part == Part::Further,
         None => !Used::Little.calibration().iter().any(|kind| kind.name() == named.kind),

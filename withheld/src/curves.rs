@@ -42,12 +42,26 @@ pub struct VisibilityBin {
 }
 
 /// Confidence against truth, bin by bin; empty bins are left out.
+///
+/// Ends are those of the reference scorer to the last digit, so that figures are the same: 0.6 lies in none of its bins.
 pub(crate) fn calibration(cases: &[CaseScore]) -> Vec<CalibrationBin> {
-    let confidences: Vec<(f64, bool)> = counted(cases).flat_map(|j| j.conf.clone()).collect();
-    let bin = |i: usize| {
+    let ends = |i: usize| {
         let from = i as f64 * 0.1;
         // The last bin holds certainty too.
-        let to = from + 0.1 + if i + 1 == BINS { 1e-9 } else { 0.0 };
+        [from, from + 0.1 + if i + 1 == BINS { 1e-9 } else { 0.0 }]
+    };
+    binned(&counted(cases).flat_map(|j| j.conf.clone()).collect::<Vec<_>>(), ends)
+}
+
+/// Confidences and whether what they are of is there, bin by bin, where one bin ends with the next; empty bins are left out.
+pub(crate) fn bins(confidences: &[(f64, bool)]) -> Vec<CalibrationBin> {
+    let end = |i: usize| i as f64 / BINS as f64;
+    binned(confidences, |i| [end(i), if i + 1 == BINS { f64::INFINITY } else { end(i + 1) }])
+}
+
+fn binned(confidences: &[(f64, bool)], ends: impl Fn(usize) -> [f64; 2]) -> Vec<CalibrationBin> {
+    let bin = |i: usize| {
+        let [from, to] = ends(i);
         let held: Vec<&(f64, bool)> = confidences.iter().filter(|(c, _)| from <= *c && *c < to).collect();
         let of = |value: fn(&(f64, bool)) -> f64| mean(&held.iter().map(|c| value(c)).collect::<Vec<f64>>());
         let (confidence, right) = of(|c| c.0).zip(of(|c| f64::from(u8::from(c.1))))?;
@@ -89,12 +103,15 @@ mod tests {
     use crate::truth::Group;
 
     #[test]
-    fn certainty_is_in_the_last_bin_and_nothing_is_lost() {
+    fn certainty_is_in_the_last_bin_and_no_edge_is_lost() {
         let conf = vec![(1.0, true), (0.95, false), (0.3, true), (0.0, false)];
-        let bins = calibration(&[case("a", &["armature"], &[], Judgement { conf, ..Judgement::default() })]);
-        let counts: Vec<(f64, usize)> = bins.iter().map(|b| (b.from, b.n)).collect();
+        let bins_of = calibration(&[case("a", &["armature"], &[], Judgement { conf, ..Judgement::default() })]);
+        let counts: Vec<(f64, usize)> = bins_of.iter().map(|b| (b.from, b.n)).collect();
         assert_eq!(counts.len(), 3);
-        assert_eq!((counts[2].1, bins[2].right), (2, 0.5));
+        assert_eq!((counts[2].1, bins_of[2].right), (2, 0.5));
+        // Every tenth, on the edge of two bins.
+        let edges: Vec<(f64, bool)> = (0..=BINS).map(|i| (i as f64 / BINS as f64, true)).collect();
+        assert_eq!(bins(&edges).iter().map(|bin| bin.n).sum::<usize>(), BINS + 1);
     }
 
     fn case(bank: &str, kinds: &[&str], power: &[f64], judgement: Judgement) -> CaseScore {

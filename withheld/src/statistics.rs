@@ -48,10 +48,13 @@ fn pairwise_sum(values: &[f64]) -> f64 {
     rest.iter().fold(((a + b) + (c + d)) + ((e + f) + (g + h)), |sum, value| sum + value)
 }
 
+/// Half of a 95 % interval in standard errors; its square is the 95 % quantile of χ² of one degree.
+pub(crate) const NORMAL_95: f64 = 1.959_963_984_540_054;
+
 /// The 95 % score interval of a share of n (Wilson, J. Am. Stat. Assoc. 22, 1927): it stays between 0 and 1, and has a
 /// width where all or none are right.
 pub(crate) fn share_interval(share: f64, n: usize) -> [f64; 2] {
-    let (n, z) = (n as f64, 1.959_963_984_540_054_f64);
+    let (n, z) = (n as f64, NORMAL_95);
     let middle = (share + z * z / (2.0 * n)) / (1.0 + z * z / n);
     let half = z / (1.0 + z * z / n) * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt();
     // All or none right: rounding must not take the end off the share.

@@ -2,7 +2,7 @@
 
 use super::Row;
 use anyhow::{Context, Result, bail};
-use gapscope_diagnosis::schema::{Parameter, Power, Quantity};
+use gapscope_diagnosis::schema::{self, Parameter, Power, Quantity};
 use gapscope_effects::Effect;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -90,6 +90,20 @@ pub fn read(path: &Path) -> Result<Results> {
         Some("gapscope.model") => Ok(of_corrected(&serde_json::from_str(&text).with_context(wrong)?)),
         _ => bail!("{}", wrong()),
     }
+}
+
+/// What a diagnosis in memory tells.
+pub fn of(diagnosis: &schema::Diagnosis) -> Results {
+    let found = |effect: &schema::FoundEffect| Found {
+        kind: effect.kind.clone(),
+        joints: effect.joints.clone(),
+        parameters: effect.parameters.clone(),
+    };
+    of_diagnosis(Diagnosis {
+        robot: diagnosis.robot.clone(),
+        effects: diagnosis.effects.iter().map(found).collect(),
+        power: diagnosis.power.clone(),
+    })
 }
 
 fn of_diagnosis(diagnosis: Diagnosis) -> Results {

@@ -116,6 +116,7 @@ mod tests {
             },
             published::Published { kind: "torque_bias", parameter: "bias", values: &[("joint2", 0.25)] },
         ],
+        known: Some(published::KnownFit { nominal: &[], corrected: &[0.5, 0.25], with: "all that is known" }),
     };
 
     #[test]
@@ -139,6 +140,8 @@ mod tests {
         assert!(row("| Coulomb friction | joint1 |").ends_with("| 0.400 | 25\u{a0}% |"), "{page}");
         assert!(row("| Coulomb friction | joint2 |").contains("| not found | | 0.100 |"), "{page}");
         assert!(row("| torque bias | joint2 |").contains("| not found | | 0.250 |"), "{page}");
+        let explained: Vec<&str> = row("| joint1 | ").split('|').map(str::trim).collect();
+        assert!(explained[5] == "0.5" && explained[4].parse::<f64>().unwrap() > 0.9, "{explained:?}");
         let other: Vec<&str> = row("| b.csv |").split('|').map(str::trim).collect();
         assert!(
             other[4].trim_end_matches("\u{a0}%").trim_start_matches('>').parse::<f64>().unwrap() > 90.0,

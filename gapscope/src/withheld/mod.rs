@@ -1,14 +1,16 @@
 //! `gapscope withheld`: cases whose hidden effect is sealed, and how well a binary names it.
 
 mod bank;
+mod calibrate;
 mod make;
 mod score;
 mod table;
+mod trial;
 
 use crate::cli::Withheld;
 use anyhow::Result;
 
-/// Makes or scores a bank; returns what to print.
+/// Makes or scores a bank, or holds confidence against it; returns what to print.
 ///
 /// # Errors
 /// A bank that is not one, or results that exist or cannot be written.
@@ -16,6 +18,7 @@ pub fn run(args: &Withheld) -> Result<String> {
     match args {
         Withheld::Make(args) => make::run(args),
         Withheld::Score(args) => score::run(args),
+        Withheld::Calibrate(args) => calibrate::run(args),
     }
 }
 

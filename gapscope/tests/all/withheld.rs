@@ -170,7 +170,9 @@ fn a_bank_is_scored() {
     let folder = tempfile::tempdir().unwrap();
     let bank = small(folder.path());
     let out = folder.path().join("out");
-    let scored = score(&bank, &["--json", "--out", out.to_str().unwrap()]);
+    let answers = folder.path().join("answers");
+    let keep = ["--keep", answers.to_str().unwrap()];
+    let scored = score(&bank, &[&keep[..], &["--json", "--out", out.to_str().unwrap()]].concat());
     assert!(scored.status.success(), "{}", String::from_utf8_lossy(&scored.stderr));
     let json: Value = serde_json::from_slice(&scored.stdout).unwrap();
     assert_eq!(json["schema"], "gapscope.withheld/1");
@@ -188,6 +190,17 @@ fn a_bank_is_scored() {
         assert!(page.contains(&format!("]({picture})")), "{picture}");
         assert!(fs::read_to_string(out.join(picture)).unwrap().starts_with("<svg xmlns"), "{picture}");
     }
+
+    // What was kept gives the same count and error of confidence, without a diagnosis more.
+    let calibrate = gapscope(&["calibrate", bank.to_str().unwrap(), "--answers", keep[1], "--json"]).output().unwrap();
+    let calibrated: Value = serde_json::from_slice(&calibrate.stdout).unwrap();
+    assert_eq!((&calibrated["cases"], &calibrated["unanswered"]), (&3.into(), &0.into()));
+    assert_eq!(calibrated["overall"]["n"], json["totals"]["reported_effects"]);
+    assert_eq!(calibrated["overall"]["error"], json["totals"]["calibration_error"]);
+    assert!(calibrated["overall"]["n"].as_u64().unwrap() > 0, "{calibrated}");
+    refused(&score(&bank, &keep), &["answers", "diagnosis.json", "--force"]);
+    let silent = score(&bank, &[&keep[..], &["--force", "--exe", "/bin/false"]].concat());
+    assert!(silent.status.success() && files(&answers).is_empty());
 
     refused(&score(&bank, &["--out", out.to_str().unwrap()]), &["score.json", "--force"]);
     fs::remove_file(out.join("score.json")).unwrap();

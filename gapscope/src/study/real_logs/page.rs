@@ -1,13 +1,13 @@
 //! One page of documentation for one log.
 
-use super::published::Log;
+use super::published::{KnownFit, Log};
 use crate::report::{
     NONE, Printed, answer_sentences, capital, effect, estimate, figure, implied_unit, joint_list, motion_unit,
     outstanding, parameter, percent, percent_interval, plain, probability_figure, regime_phrase, sentence_of_the_rest,
     with_unit,
 };
 use gapscope_diagnosis::Outcome;
-use gapscope_diagnosis::schema::{Change, Diagnosis, Estimate, FoundEffect, Parameter, Quantity};
+use gapscope_diagnosis::schema::{Change, Diagnosis, Estimate, FoundEffect, Parameter, Quantity, TorqueSeries};
 use std::fmt::Write;
 
 /// Regimes listed of what is left.
@@ -34,6 +34,9 @@ pub fn markdown(log: &Log, outcome: &Outcome, others: &[Other], pictures: [Optio
     // Writing to a string cannot fail.
     let _ =
         writeln!(text, "## What was found, beside what was published\n\n{}\n\n{}", log.source, found(log, diagnosis));
+    if let Some(known) = &log.known {
+        text.push_str(&explained(known, &outcome.evidence.torque));
+    }
     if let Some(picture) = pictures[0] {
         let _ = writeln!(
             text,
@@ -64,6 +67,39 @@ pub fn markdown(log: &Log, outcome: &Outcome, others: &[Other], pictures: [Optio
     }
     text.push_str("This page and its pictures are made by `gapscope study real-logs --data DIR --force`.\n");
     text.replace('\u{202f}', "\u{a0}")
+}
+
+/// What the models explain of each joint's effort, beside what another program does.
+fn explained(known: &KnownFit, torque: &[TorqueSeries]) -> String {
+    let mut text = format!(
+        "## What is explained of each joint’s torque\n\nR², 1 − squares left over squares about the mean. Figures here are of what was held out of \
+         each fit, those of another program of all of the log. Its corrected model has {}.\n\n\
+         | joint | as described | the same, another program | with the effects, held out | corrected by another program |\n|---|--:|--:|--:|--:|\n",
+        known.with
+    );
+    for (j, series) in torque.iter().enumerate() {
+        // Three decimals: three digits would print 0.9996 as 1.
+        let own = |model: &Vec<f64>| {
+            r_squared(&series.measured, model).map_or(NONE.into(), |r| format!("{r:.3}").replace('-', "−"))
+        };
+        let other = |all: &[f64]| all.get(j).map_or(NONE.into(), |r| plain(*r));
+        let cells =
+            [own(&series.nominal), other(known.nominal), own(&series.corrected), other(known.corrected)].join(" | ");
+        let _ = writeln!(text, "| {} | {cells} |", series.joint);
+    }
+    text.push('\n');
+    text
+}
+
+/// 1 − squares left over squares about the mean; `None` without a model of each sample, or where nothing varies.
+fn r_squared(measured: &[f64], model: &[f64]) -> Option<f64> {
+    if model.len() != measured.len() {
+        return None;
+    }
+    let mean = measured.iter().sum::<f64>() / measured.len() as f64;
+    let about: f64 = measured.iter().map(|m| (m - mean).powi(2)).sum();
+    let left: f64 = measured.iter().zip(model).map(|(m, p)| (m - p).powi(2)).sum();
+    (about > 0.0).then(|| 1.0 - left / about)
 }
 
 /// Every parameter found, and those published that were not.
@@ -187,4 +223,37 @@ fn change_row(name: &str, change: &Change) -> String {
     let [before, after] = change.gaps().map(figure);
     let shrink = change.shrink.map_or("at the floor".into(), percent);
     format!("| {name} | {before} | {after} | {shrink} | {} |\n", change.ci95.map_or(NONE.into(), percent_interval))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn r_squared_is_a_part_of_the_variance() {
+        let measured = [1.0, 2.0, 3.0, 6.0];
+        assert_eq!(r_squared(&measured, &measured), Some(1.0));
+        assert_eq!(r_squared(&measured, &[3.0; 4]), Some(0.0));
+        assert!((r_squared(&measured, &[1.0, 2.0, 3.0, 13.0]).unwrap() - (1.0 - 49.0 / 14.0)).abs() < 1e-12);
+        assert_eq!(
+            (r_squared(&measured, &[]), r_squared(&[2.0; 3], &[1.0; 3]), r_squared(&[], &[])),
+            (None, None, None)
+        );
+    }
+
+    #[test]
+    fn what_another_program_explains_stands_beside() {
+        let series = |joint: &str, model: f64| TorqueSeries {
+            joint: joint.into(),
+            measured: vec![0.0, 2.0],
+            nominal: vec![model; 2],
+            ..TorqueSeries::default()
+        };
+        let known = KnownFit { nominal: &[0.5, -9.0], corrected: &[0.9, 0.8], with: "all" };
+        let text = explained(&known, &[series("a", 1.0), series("b", 2.0)]);
+        assert!(
+            text.contains("| a | 0.000 | 0.5 | – | 0.9 |") && text.contains("| b | −1.000 | −9 | – | 0.8 |"),
+            "{text}"
+        );
+    }
 }

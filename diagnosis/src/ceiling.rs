@@ -2,8 +2,9 @@
 
 use crate::diagnose::Outcome;
 use crate::doubt::COULD_BE;
-use crate::schema::{FoundEffect, Parameter, Quantity, Verdict};
+use crate::schema::{Change, FoundEffect, Parameter, Quantity, Verdict};
 use gapscope_dynamics::{Joint, JointKind, Model};
+use gapscope_effects::Effect;
 
 /// A link keeps at least this part of the mass that its description has: those of used robots are off by a third at most.
 const LIGHTEST: f64 = 1.0 / 3.0;
@@ -11,8 +12,8 @@ const LIGHTEST: f64 = 1.0 / 3.0;
 const MOST_PLAY: [f64; 2] = [1.0, 0.1];
 
 impl Outcome {
-    /// Takes effects that the robot cannot have out of the answer, each with a finding. The others were fitted beside them,
-    /// so that they are no more than possible, and nothing is explained.
+    /// Takes effects that the robot cannot have out of the answer and the corrected model, each with a finding. The others were
+    /// fitted beside them, so that they are no more than possible, and nothing is explained.
     pub fn within_physics(&mut self, model: &Model) {
         let diagnosis = &mut self.diagnosis;
         // Worse beyond doubt: the whole interval says so.
@@ -28,15 +29,24 @@ impl Outcome {
             return;
         }
         let mut said = said.into_iter();
+        let mut gone: Vec<(String, Vec<String>)> = Vec::new();
         diagnosis.effects.retain(|effect| match said.next().flatten() {
             None => true,
             Some(why) => {
+                gone.push((effect.kind.clone(), effect.joints.clone()));
                 let what = effect.kind.replace('_', " ");
                 diagnosis.data.findings.insert(0, format!("{what} is not reported, though it fits: {why}"));
                 false
             }
         });
+        let is_gone = |effect: &Effect| gone.contains(&(effect.kind().name().to_owned(), effect.law().joints()));
+        self.corrected.effects.retain(|effect| !is_gone(effect));
         diagnosis.effects.iter_mut().for_each(|effect| effect.confidence = effect.confidence.min(COULD_BE));
+        if diagnosis.effects.is_empty() {
+            let shrink = &mut diagnosis.shrink;
+            let rollouts = shrink.rollout.iter_mut().map(|at| &mut at.change);
+            [&mut shrink.torque, &mut shrink.one_step].into_iter().chain(rollouts).for_each(Change::undo);
+        }
         if matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
             let any = !diagnosis.effects.is_empty();
             diagnosis.verdict = if any { Verdict::PartlyExplained } else { Verdict::UnknownEffect };

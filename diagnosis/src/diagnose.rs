@@ -78,7 +78,9 @@ pub fn diagnose(
     progress: Progress<'_>,
 ) -> Result<Outcome, EffectError> {
     progress("reading signals", 0.0);
-    let signals = signals(model, episodes, &mut findings);
+    let used = with_episodes(model, episodes, &mut findings);
+    let noisier = noisier(model, &used);
+    let signals: Vec<Signals> = used.into_iter().map(|(signals, _)| signals).collect();
     let still = standstill(&signals, model.dof());
     let mut moving = moving(&signals, &still, model, &mut findings);
     // A joint whose effort is not known keeps its place in the dynamics of the others, without rows of its own.
@@ -96,7 +98,6 @@ pub fn diagnose(
         doubts: Vec::new(),
         findings,
     };
-    let noisier = noisier(model, episodes, &signals);
     let known = Known::default();
     let mut logs = Logs { model, signals, noisier, band, still, moving, known };
     if !logs.is_excited() {
@@ -113,20 +114,30 @@ pub fn diagnose(
 
 /// Signals of every episode that is long enough.
 pub(crate) fn signals(model: &Model, episodes: &[Episode], findings: &mut Vec<String>) -> Vec<Signals> {
+    with_episodes(model, episodes, findings).into_iter().map(|(signals, _)| signals).collect()
+}
+
+/// The same, each with its episode: names need not tell them apart.
+fn with_episodes<'a>(
+    model: &Model,
+    episodes: &'a [Episode],
+    findings: &mut Vec<String>,
+) -> Vec<(Signals, &'a Episode)> {
     let all: Vec<Option<Signals>> = episodes.par_iter().map(|episode| Signals::new(model, episode)).collect();
     for (episode, signals) in episodes.iter().zip(&all) {
         if signals.is_none() {
             findings.push(format!("{}: too short to use ({:.2} s)", episode.name, episode.duration()));
         }
     }
-    all.into_iter().flatten().collect()
+    all.into_iter().zip(episodes).filter_map(|(signals, episode)| Some((signals?, episode))).collect()
 }
 
 /// The logs behind some signals with a part of their noise once more, see [`Signals::noisier`].
-fn noisier(model: &Model, episodes: &[Episode], signals: &[Signals]) -> Vec<Signals> {
-    let of = |s: &Signals| episodes.iter().find(|episode| episode.name == s.name);
-    let noisier = |(seed, s): (usize, &Signals)| s.noisier(model, of(s)?, PART_OF_NOISE, seed as u64);
-    signals.par_iter().enumerate().filter_map(noisier).collect()
+fn noisier(model: &Model, used: &[(Signals, &Episode)]) -> Vec<Signals> {
+    let noisier = |(seed, (signals, episode)): (usize, &(Signals, &Episode))| {
+        signals.noisier(model, episode, PART_OF_NOISE, seed as u64)
+    };
+    used.par_iter().enumerate().filter_map(noisier).collect()
 }
 
 /// Which joints tell anything: those that move enough, under an effort that was logged.

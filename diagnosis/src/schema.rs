@@ -395,6 +395,13 @@ pub struct Change {
 }
 
 impl Change {
+    /// That of a model that was left as it is.
+    pub fn undo(&mut self) {
+        self.after = self.before;
+        self.shrink = self.before.map(|_| 0.0);
+        self.ci95 = None;
+    }
+
     /// The gap before and after, NaN where it is unknown: for arithmetic and for printing.
     pub fn gaps(&self) -> [f64; 2] {
         [self.before, self.after].map(|gap| gap.unwrap_or(f64::NAN))

@@ -112,6 +112,12 @@ impl Chosen {
     fn turns(&self) -> bool {
         self.exact.entries.iter().any(|e| e.candidate.turns())
     }
+
+    /// Whether a drive turns on its own, and has the rotor that does.
+    pub(crate) fn has_rotor(&self) -> bool {
+        let rotor = |i: usize| self.fit.own(&self.exact, i).1.iter().all(|inertia| *inertia > 0.0);
+        (0..self.exact.entries.len()).any(|i| self.exact.entries[i].candidate.turns() && rotor(i))
+    }
 }
 
 impl Logs<'_> {

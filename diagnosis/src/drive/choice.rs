@@ -56,7 +56,7 @@ impl Logs<'_> {
                 let next = self.converge(all, choice.clone(), rigid.noise.clone(), Some(turned.clone()), progress)?;
                 let plain = Chosen { turned: Some(turned), ..next.with(choice, plain.0, plain.1) };
                 let next = if plain.odds_against(&next, self)? > 0.0 { plain } else { next };
-                if !next.exact.entries.iter().any(|e| e.candidate.turns()) {
+                if !next.has_rotor() {
                     continue;
                 }
                 let odds = next.odds_against(best.as_ref().unwrap_or(&rigid), self)?;

@@ -11,12 +11,14 @@ fn differences(effects: &[Effect]) -> BTreeMap<String, f64> {
     let mut all = BTreeMap::new();
     for effect in effects {
         let Effect::LinkInertiaError(link) = effect else { continue };
-        let mut put = |name: &str, value: f64| all.insert(format!("{name}.{}", link.joint), value);
+        let mut put = |name: &str, value: f64| {
+            all.insert(format!("{name}.{}", link.joint), value);
+        };
         put("mass_delta", link.mass_delta);
         let moments = ["x", "y", "z"].into_iter().zip(link.first_moment_delta);
-        moments.for_each(|(axis, value)| drop(put(&format!("first_moment_delta.{axis}"), value)));
+        moments.for_each(|(axis, value)| put(&format!("first_moment_delta.{axis}"), value));
         let inertia = ["xx", "xy", "yy", "xz", "yz", "zz"].into_iter().zip(link.inertia_delta);
-        inertia.for_each(|(axes, value)| drop(put(&format!("inertia_delta.{axes}"), value)));
+        inertia.for_each(|(axes, value)| put(&format!("inertia_delta.{axes}"), value));
     }
     all
 }

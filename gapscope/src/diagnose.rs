@@ -2,8 +2,8 @@
 
 use crate::cli::{Diagnose, Input};
 use crate::input::{Loaded, load_any};
-use crate::report::Setting;
 use crate::report::terminal::Paint;
+use crate::report::{Beside, Setting};
 use crate::{output, report, servo, summary};
 use anyhow::{Context, Result};
 use gapscope_datasets::Bound;
@@ -42,7 +42,7 @@ pub enum Found {
     /// Of a robot whose logs hold its torque.
     Torque(Box<Outcome>, Box<Setting>),
     /// Of a servo arm whose logs do not.
-    Servo(Box<gapscope_servo::Outcome>),
+    Servo(Box<gapscope_servo::Outcome>, Box<Beside>),
 }
 
 /// Diagnoses and writes nothing.
@@ -53,7 +53,8 @@ pub fn found(args: &Diagnose, progress: Told<'_>) -> Result<Found> {
     progress("reading robot and logs", 0.0);
     let loaded = load_any(&args.input, Some(Bound::DIAGNOSIS), &|word| progress(word, 0.0))?;
     if servo::lacks_effort(&loaded) {
-        return Ok(Found::Servo(Box::new(servo::diagnosed(args, loaded, progress)?)));
+        let (outcome, beside) = servo::diagnosed(args, &loaded, progress)?;
+        return Ok(Found::Servo(Box::new(outcome), Box::new(beside)));
     }
     let (outcome, setting) = diagnosed(loaded, &args.input, progress)?;
     Ok(Found::Torque(Box::new(outcome), Box::new(setting)))
@@ -67,7 +68,7 @@ impl Found {
     pub fn files(&self, out: &Path) -> Result<Vec<(&'static str, Option<String>)>> {
         match self {
             Found::Torque(outcome, setting) => files(outcome, setting, out),
-            Found::Servo(outcome) => servo::files(outcome),
+            Found::Servo(outcome, beside) => servo::files(outcome, beside, out),
         }
     }
 
@@ -78,7 +79,7 @@ impl Found {
     pub fn json(&self) -> Result<String> {
         Ok(match self {
             Found::Torque(outcome, _) => serde_json::to_string(&outcome.diagnosis)?,
-            Found::Servo(outcome) => serde_json::to_string(&outcome.diagnosis)?,
+            Found::Servo(outcome, _) => serde_json::to_string(&outcome.diagnosis)?,
         })
     }
 
@@ -86,7 +87,7 @@ impl Found {
     pub fn answer(&self, paint: &Paint) -> String {
         match self {
             Found::Torque(outcome, _) => summary::answer(&outcome.diagnosis, paint),
-            Found::Servo(outcome) => servo::answer(&outcome.diagnosis),
+            Found::Servo(outcome, _) => servo::answer(&outcome.diagnosis, paint),
         }
     }
 
@@ -96,7 +97,7 @@ impl Found {
             Found::Torque(outcome, _) => {
                 summary::summary(&outcome.diagnosis, out.map(|out| out.join("report.html")).as_deref(), paint)
             }
-            Found::Servo(outcome) => servo::summary(&outcome.diagnosis, out),
+            Found::Servo(outcome, _) => servo::summary(&outcome.diagnosis, out, paint),
         }
     }
 
@@ -109,7 +110,7 @@ impl Found {
     pub fn why(&self) -> String {
         match self {
             Found::Torque(outcome, _) => summary::why(&outcome.diagnosis),
-            Found::Servo(outcome) => servo::why(&outcome.diagnosis),
+            Found::Servo(outcome, _) => servo::why(&outcome.diagnosis),
         }
     }
 
@@ -120,7 +121,7 @@ impl Found {
                 let [place, which, how_far] = report::answer_sentences(&outcome.diagnosis, &outcome.evidence);
                 [which, place, how_far]
             }
-            Found::Servo(outcome) => servo::sentences(&outcome.diagnosis),
+            Found::Servo(outcome, _) => servo::sentences(&outcome.diagnosis),
         }
     }
 }

@@ -188,11 +188,27 @@ def use_report(page):
             if not page.evaluate(filtered):
                 faults.append("a click on a joint of the robot filters nothing")
             page.locator("#filter button").click()
+        stands = "[...document.querySelectorAll('#skeleton line')].map((l) => l.getAttribute('x2') + l.getAttribute('y2')).join()"
         for button in page.locator("[data-play]").all():
+            name, still = button.inner_text(), page.evaluate(stands)
             button.click()
-            page.wait_for_timeout(120)
-            button.click()
+            if button.inner_text() != "Stop":
+                faults.append(f"{name}: does not play")
+            page.wait_for_timeout(400)
+            if page.evaluate(stands) == still:
+                faults.append(f"{name}: nothing moves")
+            if not page.locator("#skeleton").is_visible() or not in_sight(page, "#skeleton"):
+                faults.append(f"{name}: the robot that moves is out of sight")
+            button.focus()
+            page.keyboard.press("Enter")
+            if button.inner_text() != name:
+                faults.append(f"{name}: Enter does not stop it")
     return faults
+
+
+def in_sight(page, selector):
+    box = page.locator(selector).bounding_box()
+    return box["y"] + box["height"] > 0 and box["y"] < page.viewport_size["height"]
 
 
 def ticks(_page):

@@ -19,23 +19,24 @@ pub fn answer(diagnosis: &Diagnosis) -> [String; 3] {
 }
 
 fn cause(diagnosis: &Diagnosis) -> String {
+    let named = || effects(&diagnosis.effects, &diagnosis.joints);
     let said = match diagnosis.verdict {
         Verdict::NoGap => "Model and robot agree: these logs need no effect that the model lacks.".into(),
         Verdict::NotExcited => "The robot moves too little in these logs to tell what the model lacks.".into(),
         _ if diagnosis.effects.is_empty() => "The model lacks something, and it is no effect that I know.".into(),
-        Verdict::UnknownEffect => format!("{} Something else is at work that I do not know.", effects(diagnosis)),
-        _ => effects(diagnosis),
+        Verdict::UnknownEffect => format!("{} Something else is at work that I do not know.", named()),
+        _ => named(),
     };
     if diagnosis.data.faults.iter().any(|fault| fault.mended) { format!("Of the mended logs: {said}") } else { said }
 }
 
 /// The strongest effect in a clause, the next by name, the rest by number.
-fn effects(diagnosis: &Diagnosis) -> String {
-    let [first, rest @ ..] = diagnosis.effects.as_slice() else { return String::new() };
+pub fn effects(list: &[FoundEffect], all: &[String]) -> String {
+    let [first, rest @ ..] = list else { return String::new() };
     let mut named: Vec<String> = rest
         .iter()
         .take(FURTHER)
-        .map(|e| match words::joints(&e.joints, &diagnosis.joints) {
+        .map(|e| match words::joints(&e.joints, all) {
             _ if e.joints.is_empty() => words::effect(&e.kind),
             place => format!("{} ({place})", words::effect(&e.kind)),
         })
@@ -44,7 +45,7 @@ fn effects(diagnosis: &Diagnosis) -> String {
         named.push(count(rest.len() - FURTHER, "weaker effect"));
     }
     let also = if named.is_empty() { String::new() } else { format!(" Beside it: {}.", words::list(&named, "and")) };
-    format!("{}.{also}", clause(first, &diagnosis.joints))
+    format!("{}.{also}", clause(first, all))
 }
 
 /// `joint3 rubs: 2.1 N m of dry friction that the model lacks`.
@@ -177,11 +178,16 @@ fn faults(faults: &[Fault]) -> String {
 
 /// The strongest effect that the logs cannot tell from another, in words; `None` where there is none.
 pub fn tie(diagnosis: &Diagnosis) -> Option<String> {
-    let tied = diagnosis.effects.iter().find(|effect| !effect.indistinguishable_from.is_empty())?;
+    let next = if diagnosis.next_experiment.is_some() { " The next experiment would." } else { "" };
+    Some(first_tie(&diagnosis.effects)? + next)
+}
+
+/// The same without a word of the next experiment.
+pub fn first_tie(effects: &[FoundEffect]) -> Option<String> {
+    let tied = effects.iter().find(|effect| !effect.indistinguishable_from.is_empty())?;
     let others: Vec<String> = tied.indistinguishable_from.iter().map(|kind| words::effect(kind)).collect();
     let name = words::effect(&tied.kind);
-    let next = if diagnosis.next_experiment.is_some() { " The next experiment would." } else { "" };
-    Some(format!("These logs cannot tell {name} from {}.{next}", words::list(&others, "or")))
+    Some(format!("These logs cannot tell {name} from {}.", words::list(&others, "or")))
 }
 
 #[cfg(test)]

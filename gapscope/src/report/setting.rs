@@ -37,7 +37,7 @@ impl Setting {
             Some(export(Target::Urdf, &robot, corrected, &[]).ok()?.ledger)
         });
         Setting {
-            scene: Some(Scene::new(model, episodes, corrected)),
+            scene: Some(Scene::new(model, episodes).with_rollouts(model, episodes, corrected)),
             ledger,
             origin: corrected.made_from.clone(),
             made: today(),
@@ -46,7 +46,7 @@ impl Setting {
 }
 
 /// Today, UTC; or the day of `SOURCE_DATE_EPOCH`, which makes a report the same to the byte on any day.
-fn today() -> String {
+pub fn today() -> String {
     let given = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
     let now = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO).as_secs() as i64;
     chrono::DateTime::from_timestamp(given.unwrap_or_else(now), 0)

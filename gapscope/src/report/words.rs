@@ -44,6 +44,10 @@ pub fn meaning(kind: &str) -> &'static str {
         "parallel_spring" => "a spring, cable or counterbalance across the joint",
         "joint_zero_offset" => "the encoder's zero is off",
         "external_contact" => "an outside force for some of the time",
+        "servo_gain_error" => "the servo's proportional gain is not the one given",
+        "servo_damping_error" => "the servo's derivative gain or back-EMF is not the one given",
+        "speed_limit" => "the drive turns no faster than this",
+        "dead_band" => "the servo does nothing within an error of this size",
         "joint_coupling" => "friction or inertia on a sum of two joint speeds",
         _ => "",
     }

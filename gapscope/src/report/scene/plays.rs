@@ -1,0 +1,117 @@
+//! What the skeleton can play beside the log: open-loop rollouts, and the free run of a servo arm.
+
+use super::{Moving, Play, Scene, Skeleton, most_frames, sample};
+use gapscope_datasets::Episode;
+use gapscope_diagnosis::Corrected;
+use gapscope_dynamics::{Model, StepModel};
+use gapscope_effects::Plant;
+
+/// Frames and length of a rollout, s, and its pace: it is over in a second.
+const STEPS: usize = 40;
+const HORIZON: f64 = 1.0;
+const SLOWED: f64 = 0.25;
+/// Longest stretch of a free run, s.
+const STRETCH: f64 = 12.0;
+
+impl Scene {
+    /// Adds rollouts under the logged effort: the robot, the model as described, and with the effects where there are any.
+    pub fn with_rollouts(mut self, model: &Model, episodes: &[Episode], corrected: &Corrected) -> Scene {
+        self.plays.extend(rollouts(&Skeleton::of(model), episodes, corrected));
+        self
+    }
+
+    /// Adds free runs under the set points, `[log][joint][sample]`: the stretch in which the nominal arm is furthest off.
+    pub fn with_free_run(
+        mut self,
+        model: &Model,
+        episodes: &[Episode],
+        nominal: &[Vec<Vec<f64>>],
+        corrected: &[Vec<Vec<f64>>],
+    ) -> Scene {
+        self.plays.extend(free_run(&Skeleton::of(model), episodes, nominal, corrected));
+        self
+    }
+}
+
+/// From one instant of the longest log; `None` where nothing can be rolled out.
+fn rollouts(skeleton: &Skeleton, episodes: &[Episode], corrected: &Corrected) -> Option<Play> {
+    let whole = |e: &&Episode| e.has_effort() && e.effort_unknown.is_empty() && e.len() > 2 * STEPS;
+    let episode = episodes.iter().filter(whole).max_by_key(|e| e.len())?;
+    let (model, dt) = (skeleton.model, episode.dt());
+    let start = episode.len() / 4;
+    let stride = ((HORIZON / dt) as usize).min(episode.len() - start - 2) / STEPS;
+    if stride == 0 {
+        return None;
+    }
+    let [q, before, after] = [start, start - 1, start + 1].map(|k| sample(&episode.position, k));
+    let v: Vec<f64> = match &episode.velocity {
+        Some(velocity) => sample(velocity, start),
+        None => before.iter().zip(&after).map(|(a, b)| (b - a) / (2.0 * dt)).collect(),
+    };
+    let run = |mut plant: Plant| {
+        let mut x = vec![0.0; plant.state_len()];
+        plant.start_at(start as f64 * dt, &q, &v, &mut x);
+        let mut frames = vec![skeleton.at(&q)];
+        for step in 0..STEPS {
+            for k in 0..stride {
+                plant.step(&mut x, &sample(&episode.effort, start + step * stride + k));
+            }
+            let place = &x[..model.dof()];
+            if place.iter().any(|q| !q.is_finite()) {
+                break;
+            }
+            frames.push(skeleton.at(place));
+        }
+        frames
+    };
+    let log = (0..=STEPS).map(|s| skeleton.at(&sample(&episode.position, start + s * stride))).collect();
+    let mut skeletons = vec![Moving { class: "measured", frames: log }];
+    skeletons.push(Moving { class: "before", frames: run(Plant::nominal(model, dt)) });
+    if !corrected.effects.is_empty() {
+        skeletons.push(Moving { class: "after", frames: run(corrected.plant(model, dt).ok()?) });
+    }
+    let length = (STEPS * stride) as f64 * dt;
+    Some(Play { name: "rollout", label: "Play a rollout", length, pace: SLOWED, skeletons })
+}
+
+/// `None` where no log has two samples.
+fn free_run(
+    skeleton: &Skeleton,
+    episodes: &[Episode],
+    nominal: &[Vec<Vec<f64>>],
+    corrected: &[Vec<Vec<f64>>],
+) -> Option<Play> {
+    let stretches = episodes.iter().zip(nominal).enumerate().filter(|(_, (e, _))| e.len() > 1 && e.dt() > 0.0);
+    let far = |e: &Episode, path: &[Vec<f64>], from: usize, to: usize| {
+        let rows = path.iter().zip(&e.position);
+        let square =
+            rows.map(|(a, b)| (from..=to).map(|k| (a[k] - b[k]).powi(2)).filter(|x| x.is_finite()).sum::<f64>());
+        square.sum::<f64>()
+    };
+    let candidates = stretches.flat_map(|(log, (e, path))| {
+        let length = ((STRETCH / e.dt()) as usize).clamp(1, e.len() - 1);
+        // Stretches overlap by half.
+        (0..e.len() - length).step_by(length.div_ceil(2)).map(move |from| {
+            let to = from + length;
+            (far(e, path, from, to), log, from, to)
+        })
+    });
+    let (_, log, from, to) = candidates.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let episode = &episodes[log];
+    let steps = most_frames(skeleton.model).min(to - from);
+    let frames = |path: &[Vec<f64>]| {
+        let places = (0..=steps).map(|s| from + s * (to - from) / steps);
+        let sound = |k: &usize| path.iter().all(|row| row.get(*k).is_some_and(|q| q.is_finite()));
+        places.take_while(sound).map(|k| skeleton.at(&sample(path, k))).collect::<Vec<_>>()
+    };
+    let robot = (0..=steps).map(|s| skeleton.at(&sample(&episode.position, from + s * (to - from) / steps))).collect();
+    let mut skeletons = vec![Moving { class: "measured", frames: robot }];
+    for (class, paths) in [("before", nominal), ("after", corrected)] {
+        let frames = paths.get(log).map(|path| frames(path)).unwrap_or_default();
+        if !frames.is_empty() {
+            skeletons.push(Moving { class, frames });
+        }
+    }
+    let length = episode.time[to] - episode.time[from];
+    Some(Play { name: "free-run", label: "Play the free run", length, pace: 1.0, skeletons })
+}

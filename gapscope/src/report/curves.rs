@@ -2,11 +2,19 @@
 
 use super::axis::{Axis, extent};
 use super::chart::{Plot, band, dots, line};
-use super::format::count;
+use super::format::{count, numbers};
 use super::words;
-use gapscope_diagnosis::schema::{EffectCurve, Evidence};
+use gapscope_diagnosis::schema::{EffectCurve, Evidence, FoundEffect, Parameter};
 use maud::{Markup, html};
 
+/// Effects whose torque is in proportion to one parameter: its interval is a band around their law.
+const PROPORTIONAL: [(&str, &str); 5] = [
+    ("coulomb_friction", "coulomb"),
+    ("viscous_friction", "viscous"),
+    ("load_dependent_friction", "load_coefficient"),
+    ("armature", "armature"),
+    ("torque_bias", "bias"),
+];
 /// Curves shown at once; the rest folds away.
 const FIRST: usize = 12;
 /// Dots of one curve.
@@ -43,9 +51,34 @@ impl From<&EffectCurve> for Curve {
     }
 }
 
-/// The laws of a diagnosis.
-pub fn of(evidence: &Evidence) -> Vec<Curve> {
-    evidence.curves.iter().map(Curve::from).collect()
+/// The laws of a diagnosis, each with a band where it is known.
+pub fn of(evidence: &Evidence, effects: &[FoundEffect]) -> Vec<Curve> {
+    let with_band = |drawn: &EffectCurve| {
+        let mut curve = Curve::from(drawn);
+        if let Some(ends) = ends(effects, &curve.kind, &curve.joint) {
+            let at = |[x, y]: [f64; 2]| {
+                let [a, b] = ends.map(|end| end * y);
+                [x, a.min(b), a.max(b)]
+            };
+            curve.band = curve.law.iter().map(|point| at(*point)).collect();
+        }
+        curve
+    };
+    evidence.curves.iter().map(with_band).collect()
+}
+
+/// Ends of a law's parameter as parts of its value, where the law is in proportion to that one.
+fn ends(effects: &[FoundEffect], kind: &str, joint: &str) -> Option<[f64; 2]> {
+    let (_, name) = PROPORTIONAL.iter().find(|(of, _)| *of == kind)?;
+    let of_joint = |effect: &FoundEffect| match effect.parameters.get(*name)? {
+        Parameter::PerJoint(map) => map.get(joint).cloned(),
+        Parameter::Single(one) => Some(one.clone()),
+    };
+    let found = effects.iter().filter(|effect| effect.kind == kind).find_map(of_joint)?;
+    let scalar = |quantity| <[f64; 1]>::try_from(numbers(quantity)).ok();
+    let ([value], [low], [high]) = (scalar(&found.value)?, scalar(&found.ci95[0])?, scalar(&found.ci95[1])?);
+    let parts = [low / value, high / value];
+    parts.iter().all(|part| part.is_finite()).then_some(parts)
 }
 
 /// Small multiples, the most important first, or `none` where there are none. `joints` are in the robot's order.
@@ -169,4 +202,25 @@ fn choose(curves: &[&Curve], joints: &[String]) -> Vec<usize> {
         (kind, joints.iter().position(|joint| *joint == curves[i].joint), i)
     });
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn the_interval_of_a_parameter_is_a_band_around_its_law() {
+        let (_, diagnosis, evidence) = sample::explained();
+        let curves = of(&evidence, &diagnosis.effects);
+        let friction = curves.iter().find(|c| c.kind == "coulomb_friction" && c.joint == "panda_joint2").unwrap();
+        // 1.51 N m, from 1.469 to 1.551.
+        for ([_, y], [_, low, high]) in friction.law.iter().zip(&friction.band) {
+            let ends = [1.469 / 1.51 * y, 1.551 / 1.51 * y];
+            assert!((low - ends[0].min(ends[1])).abs() < 1e-3 && (high - ends[0].max(ends[1])).abs() < 1e-3);
+        }
+        assert_eq!(friction.law.len(), friction.band.len());
+        // A payload's law hangs on mass, place and inertia: no one interval is a band.
+        assert!(curves.iter().filter(|c| c.kind == "payload").all(|c| c.band.is_empty()));
+    }
 }

@@ -260,7 +260,8 @@ fn figures(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence) -> Markup 
         "No curves were kept for this report."
     };
     html! {
-        (section("laws", "The law of each effect", "", &curves::render(&curves::of(evidence), &diagnosis.joints, no_law)))
+        (section("laws", "The law of each effect", "The band is the interval of the parameter, where the law is in proportion to one. Of all others the table above has the intervals.",
+            &curves::render(&curves::of(evidence, &diagnosis.effects), &diagnosis.joints, no_law)))
         (section("joints", "Torque gap by joint", "Measured torque less what the model needs for the same motion, rms on held-out data.",
             &joints::render(gauge)))
         (section("regimes", "Where the gap lies", "Share of each regime in its joint’s squared torque gap, for the model as described, on held-out data.",

@@ -6,7 +6,7 @@ use crate::report::terminal::Paint;
 use crate::report::{Beside, Setting};
 use crate::{output, report, servo, summary};
 use anyhow::{Context, Result};
-use gapscope_datasets::Bound;
+use gapscope_datasets::{Bound, Trajectory};
 use gapscope_diagnosis::schema::Evidence;
 use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, Progress as Told, diagnose};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -159,7 +159,8 @@ fn diagnosed(loaded: Loaded, input: &Input, progress: Told<'_>) -> Result<(Outco
     outcome.evidence.robot_file = input.robot.display().to_string();
     outcome.evidence.logs = input.logs.iter().map(|l| l.display().to_string()).collect();
     let described = description.model(&input.robot, &held).ok();
-    let setting = Setting::new(&model, &episodes, &outcome.corrected, &description, described.as_ref());
+    let next = proposed(&outcome);
+    let setting = Setting::new(&model, &episodes, &outcome.corrected, next, &description, described.as_ref());
     Ok((outcome, setting))
 }
 
@@ -171,9 +172,14 @@ pub fn write(outcome: &Outcome, setting: &Setting, out: &Path) -> Result<()> {
     output::write_all(out, &files(outcome, setting, out)?)
 }
 
+/// The motion that the next experiment names, if it names one.
+fn proposed(outcome: &Outcome) -> Option<&Trajectory> {
+    outcome.diagnosis.next_experiment.as_ref()?.trajectory.as_ref()?;
+    outcome.trajectory.as_ref()
+}
+
 fn files(outcome: &Outcome, setting: &Setting, out: &Path) -> Result<Vec<(&'static str, Option<String>)>> {
-    let proposed = outcome.diagnosis.next_experiment.as_ref().and_then(|next| next.trajectory.as_ref());
-    let motion = proposed.zip(outcome.trajectory.as_ref()).map(|(_, trajectory)| trajectory.to_csv());
+    let motion = proposed(outcome).map(Trajectory::to_csv);
     let mut evidence = outcome.evidence.clone();
     evidence.corrected_file = out.join("corrected.json").display().to_string();
     Ok(vec![

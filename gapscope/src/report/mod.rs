@@ -212,6 +212,7 @@ fn section(id: &str, title: &str, lead: &str, content: &Markup) -> Markup {
 }
 
 fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Markup {
+    let playable = setting.scene.as_ref().is_some_and(|scene| scene.plays.iter().any(|play| play.name == scene::NEXT));
     let evaluated = diagnosis.verdict != Verdict::NotExcited || !diagnosis.gap.torque.rms.is_empty();
     let robot = match evidence.robot_file.as_str() {
         "" => "ROBOT.urdf".to_owned(),
@@ -229,7 +230,7 @@ fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Set
         @if let Some(why) = why::render(&diagnosis.why, &diagnosis.joints) {
             (section("why", "Why it is so", "What was proposed, against what, and by how much the logs spoke for it.", &why))
         }
-        (section("next", "The next experiment", "", &rest::next_experiment(diagnosis)))
+        (section("next", "The next experiment", "", &rest::next_experiment(diagnosis, playable)))
         @if !diagnosis.power.is_empty() {
             (section("power", "What these logs could have revealed", "The least size of each effect that would have been found. Anything smaller could be there, and nobody could tell from these logs.",
                 &power::render(diagnosis)))

@@ -67,8 +67,8 @@ pub fn alternatives(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-/// The motion that would tell more.
-pub fn next_experiment(diagnosis: &Diagnosis) -> Markup {
+/// The motion that would tell more; `playable` where the robot on the page can play it.
+pub fn next_experiment(diagnosis: &Diagnosis, playable: bool) -> Markup {
     let Some(next) = &diagnosis.next_experiment else {
         let text = match diagnosis.verdict {
             Verdict::NoGap | Verdict::Explained => "None needed: these logs leave nothing to separate.",
@@ -83,6 +83,9 @@ pub fn next_experiment(diagnosis: &Diagnosis) -> Markup {
             p { (super::ticked(&next.why)) }
             @if let Some(file) = &next.trajectory {
                 p { code { (file) } " beside this report holds time, position, velocity and acceleration of every joint, from rest to rest, within the URDF’s limits. Diagnose its log together with these." }
+            }
+            @if playable {
+                p.tools.needs-script { button type="button" data-play=(super::scene::NEXT) { "Play it on the robot above" } }
             }
             @if !kinds.is_empty() { p.muted { "Tells apart: " (words::list(&kinds, "and")) "." } }
         }

@@ -4,6 +4,8 @@
 
 mod plays;
 
+pub use plays::NEXT;
+
 use super::packed::Packed;
 use gapscope_datasets::Episode;
 use gapscope_dynamics::{Data, Model};

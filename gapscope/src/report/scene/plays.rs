@@ -1,7 +1,7 @@
-//! What the skeleton can play beside the log: open-loop rollouts, and the free run of a servo arm.
+//! What the skeleton can play beside the log: open-loop rollouts, the free run of a servo arm, and the motion to log next.
 
 use super::{Moving, Play, Scene, Skeleton, most_frames, sample};
-use gapscope_datasets::Episode;
+use gapscope_datasets::{Episode, Trajectory};
 use gapscope_diagnosis::Corrected;
 use gapscope_dynamics::{Model, StepModel};
 use gapscope_effects::Plant;
@@ -10,6 +10,8 @@ use gapscope_effects::Plant;
 const STEPS: usize = 40;
 const HORIZON: f64 = 1.0;
 const SLOWED: f64 = 0.25;
+/// The play that is the next experiment.
+pub const NEXT: &str = "next";
 /// Longest stretch of a free run, s.
 const STRETCH: f64 = 12.0;
 
@@ -31,6 +33,23 @@ impl Scene {
         self.plays.extend(free_run(&Skeleton::of(model), episodes, nominal, corrected));
         self
     }
+
+    /// Adds a motion that the robot is to follow.
+    pub fn with_motion(mut self, model: &Model, trajectory: &Trajectory) -> Scene {
+        self.plays.extend(motion(&Skeleton::of(model), trajectory));
+        self
+    }
+}
+
+/// `None` where the motion is not one of this robot's joints, or has no two rows.
+fn motion(skeleton: &Skeleton, trajectory: &Trajectory) -> Option<Play> {
+    let last = trajectory.time.len().checked_sub(1).filter(|last| *last > 0)?;
+    let fits = trajectory.joints.iter().eq(skeleton.model.joints().iter().map(|joint| &joint.name));
+    let steps = most_frames(skeleton.model).min(last);
+    let frames = (0..=steps).map(|s| skeleton.at(&sample(&trajectory.position, s * last / steps))).collect();
+    let skeletons = vec![Moving { class: "measured", frames }];
+    let length = trajectory.duration();
+    fits.then_some(Play { name: NEXT, label: "Play the next experiment", length, pace: 1.0, skeletons })
 }
 
 /// From one instant of the longest log; `None` where nothing can be rolled out.
@@ -114,4 +133,28 @@ fn free_run(
     }
     let length = episode.time[to] - episode.time[from];
     Some(Play { name: "free-run", label: "Play the free run", length, pace: 1.0, skeletons })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gapscope_dynamics::robots;
+
+    #[test]
+    fn a_motion_plays_from_its_first_row_to_its_last() {
+        let model = robots::model("double_pendulum").unwrap().unwrap().model;
+        let joints: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+        let time: Vec<f64> = (0..500).map(|k| 0.01 * f64::from(k)).collect();
+        let position = vec![time.clone(), time.iter().map(|t| -t).collect()];
+        let trajectory = Trajectory { joints, time, position, ..Trajectory::default() };
+        let scene = Scene::new(&model, &[]).with_motion(&model, &trajectory);
+        let [play] = scene.plays.as_slice() else { panic!("one play") };
+        assert!((play.length - 4.99).abs() < 1e-9 && play.name == NEXT);
+        let skeleton = Skeleton::of(&model);
+        let frames = &play.skeletons[0].frames;
+        assert_eq!(frames[0], skeleton.at(&[0.0, 0.0]));
+        assert_eq!(*frames.last().unwrap(), skeleton.at(&[4.99, -4.99]));
+        let other = Trajectory { joints: vec!["other".into()], ..trajectory };
+        assert!(Scene::new(&model, &[]).with_motion(&model, &other).plays.is_empty());
+    }
 }

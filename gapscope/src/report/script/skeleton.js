@@ -152,7 +152,10 @@ if (scene && skeleton) {
       return;
     }
     playing = button.dataset.play;
-    button.textContent = "Stop";
+    buttons.forEach((other) => { if (other.dataset.play === playing) other.textContent = "Stop"; });
+    // The button may stand far from the robot that it moves.
+    const seen = skeleton.getBoundingClientRect();
+    if (seen.bottom < 0.5 * seen.height || seen.top > innerHeight - 0.5 * seen.height) skeleton.scrollIntoView({ block: "center" });
     const play = plays.find((play) => play.name === playing);
     document.querySelector(".rollout-key").hidden = !play || play.skeletons.length < 2;
     const start = performance.now(), first = frame >= time.length - 1 ? 0 : frame, t0 = time[Math.floor(first)];

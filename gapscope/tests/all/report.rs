@@ -1,6 +1,6 @@
 //! The pages as a person uses them: in a real browser where there is one; and the answer in short.
 
-use crate::support::{gapscope, pendulum, said, servo_arm};
+use crate::support::{chain, gapscope, pendulum, said, servo_arm};
 use std::path::Path;
 use std::process::Command;
 
@@ -64,6 +64,37 @@ fn a_servo_arm_without_torque_has_the_same_page_of_position() {
     let first = told.lines().next().unwrap();
     assert!(page.contains(first.split(' ').next().unwrap()), "terminal and page begin alike");
     assert!(page.len() < 600_000, "{} bytes", page.len());
+    look(&[&file], false);
+}
+
+#[test]
+fn thirty_joints_with_long_names_have_a_page_that_works() {
+    let dir = chain(30);
+    if let Ok(kept) = std::env::var("GAPSCOPE_KEEP_CHAIN") {
+        for file in ["robot.urdf", "log.csv"] {
+            std::fs::copy(dir.path().join(file), Path::new(&kept).join(file)).unwrap();
+        }
+    }
+    let output = gapscope(dir.path(), ["diagnose", "robot.urdf", "log.csv", "--out", "chain"]);
+    assert!(output.status.success(), "{}", said(&output));
+    let file = dir.path().join("chain/report.html");
+    let page = std::fs::read_to_string(&file).unwrap();
+    assert!(page.contains("_segment_30_rotation_joint") && page.len() < 2_000_000, "{} bytes", page.len());
+    look(&[&file], false);
+}
+
+#[test]
+fn the_next_experiment_plays_on_the_robot() {
+    let dir = pendulum();
+    // A second and a half tells nothing: the answer is a motion to log.
+    let log = std::fs::read_to_string(dir.path().join("log.csv")).unwrap();
+    let short: String = log.lines().take(301).map(|line| format!("{line}\n")).collect();
+    std::fs::write(dir.path().join("short.csv"), short).unwrap();
+    let output = gapscope(dir.path(), ["diagnose", "robot.urdf", "short.csv", "--out", "short"]);
+    assert!(output.status.success() && dir.path().join("short/next_experiment.csv").is_file(), "{}", said(&output));
+    let file = dir.path().join("short/report.html");
+    let page = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(page.matches("data-play=\"next\"").count(), 2, "beside the robot and beside the words");
     look(&[&file], false);
 }
 

@@ -1,7 +1,7 @@
 //! What the tests of the commands share.
 
 use gapscope_datasets::{Episode, Recipe, generate, write_csv};
-use gapscope_dynamics::robots;
+use gapscope_dynamics::{Data, Model, robots};
 use gapscope_effects::{Effect, ViscousFriction};
 use gapscope_servo::{Given, Law, Param, joints, simulate_arm};
 use std::ffi::OsStr;
@@ -65,5 +65,51 @@ pub fn servo_arm() -> tempfile::TempDir {
     }
     std::fs::write(dir.path().join("log.csv"), text).unwrap();
     std::fs::write(dir.path().join("robot.urdf"), robots::double_pendulum()).unwrap();
+    dir
+}
+
+/// A folder with `robot.urdf`, a hanging chain of so many joints with long names, and `log.csv`, 8 s of it at 100 Hz with dry
+/// friction at the fifth joint that its URDF lacks.
+pub fn chain(joints: usize) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let name = |j: usize| format!("left_front_manipulator_segment_{:02}_rotation_joint", j + 1);
+    let mut urdf = String::from("<robot name=\"chain_with_many_joints_and_long_names\"><link name=\"base\"/>\n");
+    for j in 0..joints {
+        let (mass, axis) = (0.8 * 0.95_f64.powi(j as i32), ["0 1 0", "0 0 1", "1 0 0"][j % 3]);
+        let (side, along) = (mass * 2e-3, mass * 8e-4);
+        let parent = if j == 0 { "base".to_owned() } else { format!("link{}", j - 1) };
+        urdf += &format!(
+            "<link name=\"link{j}\"><inertial><origin xyz=\"0.01 0 -0.06\"/><mass value=\"{mass:.5}\"/>\
+             <inertia ixx=\"{side:.7}\" iyy=\"{side:.7}\" izz=\"{along:.7}\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>\n\
+             <joint name=\"{}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"link{j}\"/><origin xyz=\"0 0 -0.12\"/>\
+             <axis xyz=\"{axis}\"/><limit lower=\"-2\" upper=\"2\" effort=\"300\" velocity=\"5\"/></joint>\n",
+            name(j)
+        );
+    }
+    urdf += "</robot>\n";
+    let model = Model::from_urdf(&urdf).unwrap().model;
+    let columns = |channel: &str| (0..joints).map(|j| format!(",{channel}.{}", name(j))).collect::<String>();
+    let mut text = format!("time{}{}\n", columns("position"), columns("effort"));
+    let mut data = Data::new(&model);
+    for k in 0..800 {
+        let t = 0.01 * f64::from(k);
+        // Two sines for each joint, none like another's.
+        let sines = |j: usize| [(0.35, 1.3 + 0.11 * j as f64), (0.12, 3.1 + 0.07 * j as f64)];
+        let sum = |of: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
+            (0..joints)
+                .map(|j| sines(j).iter().map(|&(size, rate)| size * of(rate, rate * t + j as f64)).sum())
+                .collect()
+        };
+        let q = sum(&|_, phase| phase.sin());
+        let v = sum(&|rate, phase| rate * phase.cos());
+        let a = sum(&|rate, phase| -rate * rate * phase.sin());
+        let mut effort = vec![0.0; joints];
+        model.inverse_dynamics(&mut data, &q, &v, &a, &mut effort);
+        effort[4] += 2.0 * v[4].signum();
+        let row: String = q.iter().chain(&effort).map(|x| format!(",{x:.6}")).collect();
+        text += &format!("{t:.2}{row}\n");
+    }
+    std::fs::write(dir.path().join("log.csv"), text).unwrap();
+    std::fs::write(dir.path().join("robot.urdf"), urdf).unwrap();
     dir
 }

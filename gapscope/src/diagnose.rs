@@ -1,16 +1,49 @@
 //! `gapscope diagnose`.
 
-use crate::cli::{Diagnose, Input};
+use crate::cli::Input;
 use crate::input::{Loaded, load_any};
 use crate::report::terminal::Paint;
 use crate::report::{Beside, Setting};
 use crate::{output, report, servo, summary};
 use anyhow::{Context, Result};
+use clap::Args;
 use gapscope_datasets::{Bound, Trajectory};
 use gapscope_diagnosis::schema::Evidence;
 use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, Progress as Told, diagnose};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
+use std::path::PathBuf;
+
+/// Arguments of `diagnose`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope diagnose robot.urdf run1.csv run2.csv.gz
+  gapscope diagnose robot.urdf bag/ --topic /joint_states --out first
+  gapscope diagnose robot.urdf run.csv --map position.joint1=q1 --map effort.joint1=tau1
+  gapscope diagnose robot.urdf run_*.csv --quiet          three sentences, for a script or a chat")]
+pub struct Diagnose {
+    /// Robot and logs
+    #[command(flatten)]
+    pub input: Input,
+    /// Folder for diagnosis.json, report.html, corrected.json and next_experiment.csv [default: a new folder beside the first log]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    pub force: bool,
+    /// What is known of the servos, where logs hold no torque: gains, constants, limits, as numbers or ranges (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub drive: Option<PathBuf>,
+    /// Print what was proposed, against what, and by how much the logs spoke for or against it
+    #[arg(long)]
+    pub why: bool,
+    /// Print the answer in three sentences and nothing else, without progress
+    #[arg(long, short, conflicts_with_all = ["why", "json"])]
+    pub quiet: bool,
+    /// Print diagnosis.json, as it is written beside, and nothing else
+    #[arg(long, conflicts_with = "why")]
+    pub json: bool,
+}
 
 /// Diagnoses and writes the results; returns what to print.
 ///

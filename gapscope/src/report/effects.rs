@@ -33,7 +33,7 @@ pub fn render(effects: &[FoundEffect], joints: &[String], shrinks: &str, nothing
 }
 
 fn row(effect: &FoundEffect, all: &[String], shrinks: &str) -> Markup {
-    let apart: Vec<String> = effect.indistinguishable_from.iter().map(|kind| words::effect(kind)).collect();
+    let apart = words::effects(&effect.indistinguishable_from);
     html! {
         tbody data-joints=(super::listed(&effect.joints)) {
             tr.effect {

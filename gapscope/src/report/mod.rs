@@ -58,8 +58,8 @@ pub use series::picture as series_picture;
 pub use servo::{Beside, answer as servo_answer, follows as servo_follows, html as servo_html};
 pub use setting::Setting;
 pub use words::{
-    capital, effect, implied_unit, interval, joints as joint_list, motion_unit, outstanding, parameter, regime,
-    regime_phrase, rest as words_of_the_rest, said_of, verdict,
+    capital, effect, effects, implied_unit, interval, joints as joint_list, motion_unit, outstanding, parameter,
+    regime, regime_phrase, rest as words_of_the_rest, said_of, verdict,
 };
 
 /// Colours, type and layout; light and dark, wide, narrow and print.

@@ -79,6 +79,16 @@ fn clause(effect: &FoundEffect, all: &[String]) -> String {
             let gain = size("gain").map_or(String::new(), |gain| format!("{gain} times "));
             format!("{subject} {} {gain}the torque that is logged", verb("delivers", "deliver"))
         }
+        // Of servo arms.
+        "speed_limit" if size("limit").is_some() => {
+            format!("{subject} {} no faster than {}", verb("turns", "turn"), size("limit").unwrap_or_default())
+        }
+        "servo_gain_error" if size("gain").is_some() => {
+            format!("At {place} the servo pulls {} times as hard as was given", size("gain").unwrap_or_default())
+        }
+        "dead_band" if size("width").is_some() => {
+            format!("At {place} the servo rests within {} of its set point", size("width").unwrap_or_default())
+        }
         kind => {
             let at = if effect.joints.is_empty() { String::new() } else { format!(" at {place}") };
             let values: Vec<String> = effect
@@ -185,7 +195,7 @@ pub fn tie(diagnosis: &Diagnosis) -> Option<String> {
 /// The same without a word of the next experiment.
 pub fn first_tie(effects: &[FoundEffect]) -> Option<String> {
     let tied = effects.iter().find(|effect| !effect.indistinguishable_from.is_empty())?;
-    let others: Vec<String> = tied.indistinguishable_from.iter().map(|kind| words::effect(kind)).collect();
+    let others = words::effects(&tied.indistinguishable_from);
     let name = words::effect(&tied.kind);
     Some(format!("These logs cannot tell {name} from {}.", words::list(&others, "or")))
 }

@@ -50,7 +50,7 @@ fn picture(gauge: &Gauge, scene: &Scene, still: &[DVec3]) -> Markup {
         html! { line.link x1=(short3(x1)) y1=(short3(y1)) x2=(short3(x2)) y2=(short3(y2)) {} }
     };
     html! {
-        figure.skeleton {
+        figure.skeleton.many[n > LABELLED] {
             svg #skeleton viewBox="-1 -1 2 2" role="group" tabindex="0"
                 aria-label={ "Skeleton of " (gauge.robot) ", joints coloured by " (gauge.what) " gap. Arrow keys turn it." } {
                 polyline.floor points=(floor.join(" ")) {}
@@ -84,6 +84,9 @@ fn picture(gauge: &Gauge, scene: &Scene, still: &[DVec3]) -> Markup {
     }
 }
 
+/// Joints whose numbers stand beside them; of more each shows as it is pointed at.
+const LABELLED: usize = 12;
+
 /// One entry for each joint: number, name, gap.
 fn chips(gauge: &Gauge) -> Markup {
     html! {
@@ -94,7 +97,7 @@ fn chips(gauge: &Gauge) -> Markup {
                 li class=(class) style=(style) {
                     a href={ "#" (super::OVER_TIME) } data-pick=(joint.name) {
                         i.dot aria-hidden="true" {}
-                        span.name title=(joint.name) { (joint.name) }
+                        span.name title=(joint.name) { bdi { (joint.name) } }
                         @match (joint.before, bold) {
                             (Some(gap), Some(_)) => b { (with_unit(&significant(gap.value, 3), &joint.unit)) },
                             (Some(_), None) => span.muted { "at the noise" },

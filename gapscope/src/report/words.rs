@@ -20,6 +20,18 @@ pub fn effect(kind: &str) -> String {
     }
 }
 
+/// Effects in words, each once.
+pub fn effects(kinds: &[String]) -> Vec<String> {
+    let mut list: Vec<String> = vec![];
+    for kind in kinds {
+        let name = effect(kind);
+        if !list.contains(&name) {
+            list.push(name);
+        }
+    }
+    list
+}
+
 /// What the real robot does that the model does not, in one clause; empty for kinds outside the catalogue.
 pub fn meaning(kind: &str) -> &'static str {
     match kind {
@@ -329,6 +341,11 @@ mod tests {
         let named = names(&["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_joint"]);
         assert_eq!(joints(&named, &named), "all 4 joints");
         assert_eq!(joints(&[], &named), "whole robot");
+    }
+
+    #[test]
+    fn an_effect_is_named_once() {
+        assert_eq!(effects(&names(&["payload", "backlash", "payload"])), ["payload", "backlash"]);
     }
 
     #[test]

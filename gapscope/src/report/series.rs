@@ -139,7 +139,9 @@ pub fn render(gauge: &Gauge) -> Markup {
         }
         div data-still="" { (one(shown)) }
         details.all-joints open[drawn.len() <= OPEN] {
-            summary { "All " (count(drawn.len(), "joint")) ", with the error that is left" }
+            summary {
+                @if drawn.len() > 1 { "All " (count(drawn.len(), "joint")) ", with the error that is left" } @else { "With the error that is left" }
+            }
             div.grid-two {
                 @for series in drawn {
                     div data-joints=(super::listed(std::slice::from_ref(&series.joint))) {

@@ -12,7 +12,7 @@ use gapscope_datasets::{Doubt, Episode, Fault};
 use gapscope_diagnosis::Origin;
 use gapscope_diagnosis::schema::Verdict;
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_servo::schema::{Diagnosis, FoundDrive};
+use gapscope_servo::schema::{Diagnosis, Estimate, FoundDrive};
 use gapscope_servo::{Evidence, Outcome, Signal};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
@@ -245,31 +245,13 @@ fn drives(diagnosis: &Diagnosis) -> Markup {
         div.scroll tabindex="0" role="region" aria-label="What drives each joint" {
             table.plain.drives {
                 thead { tr {
-                    th scope="col" { "joint" } th scope="col" { "follows" } th scope="col" { "constant" }
-                    th.number scope="col" { "value" } th.number scope="col" { "95 % interval" }
+                    th scope="col" { "constant" } th.number scope="col" { "value" } th.number scope="col" { "95 % interval" }
                 } }
                 @for (joint, drive) in drives {
-                    @let rows = drive.constants.len().max(1);
                     tbody data-joints=(super::listed(std::slice::from_ref(joint))) {
-                        @if drive.constants.is_empty() { tr {
-                            th scope="rowgroup" { (joint) } td { (follows(drive)) } td.muted colspan="3" { "nothing is determined" }
-                        } }
-                        @for (i, (name, found)) in drive.constants.iter().enumerate() {
-                            @let printed = format::estimate(&schema::estimate(found));
-                            @let given = drive.given.contains(name);
-                            tr {
-                                @if i == 0 { th scope="rowgroup" rowspan=(rows) { (joint) } td rowspan=(rows) { (follows(drive)) } }
-                                td { (words::parameter(name)) }
-                                td.number { b { (printed.value) } (with_unit("", &printed.unit)) }
-                                td.number {
-                                    @if given { span.muted { "given" } }
-                                    @else {
-                                        (printed.interval.join(" "))
-                                        @if !found.determined { " " span.muted { "not determined" } }
-                                    }
-                                }
-                            }
-                        }
+                        tr { th scope="rowgroup" colspan="3" { b { (joint) } span.muted { " follows its " (follows(drive)) } } }
+                        @if drive.constants.is_empty() { tr { td.muted colspan="3" { "No constant is determined." } } }
+                        @for (name, found) in &drive.constants { (constant(name, found, drive.given.contains(name))) }
                     }
                 }
             }
@@ -278,6 +260,23 @@ fn drives(diagnosis: &Diagnosis) -> Markup {
             p.note data-joints=(super::listed(std::slice::from_ref(joint))) {
                 (joint) ", gain of each log over the first one’s: "
                 (drive.gains.iter().map(|(log, gain)| format!("{log} {}", format::plain(*gain))).collect::<Vec<_>>().join(", "))
+            }
+        }
+    }
+}
+
+fn constant(name: &str, found: &Estimate, given: bool) -> Markup {
+    let printed = format::estimate(&schema::estimate(found));
+    html! {
+        tr {
+            td { (words::parameter(name)) }
+            td.number { b { (printed.value) } (with_unit("", &printed.unit)) }
+            td.number {
+                @if given { span.muted { "given" } }
+                @else {
+                    (printed.interval.join(" "))
+                    @if !found.determined { " " span.muted { "not determined" } }
+                }
             }
         }
     }

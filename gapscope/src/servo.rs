@@ -4,6 +4,7 @@ use crate::cli::{Diagnose, Evaluate};
 use crate::input::Loaded;
 use crate::report::terminal::{Paint, clean, wrap};
 use crate::report::{self, Beside, joint_list};
+use crate::summary;
 use anyhow::{Context, Result, bail};
 use gapscope_servo::schema::{Change, Diagnosis, Estimate, Evaluation, FoundDrive, FoundEffect};
 use gapscope_servo::{Given, Outcome, Paths, ServoModel};
@@ -214,8 +215,7 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
 
 /// Lines joined, free of control characters: a log's words cannot steer the terminal.
 fn plain(lines: &[String]) -> String {
-    let clean = |line: &String| line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
-    lines.iter().map(|line| format!("{}\n", clean(line).trim_end())).collect()
+    summary::ordinary_spaces(&lines.iter().map(|line| clean(line)).collect::<Vec<_>>())
 }
 
 fn headline(diagnosis: &Diagnosis) -> String {

@@ -174,7 +174,7 @@ pub fn evaluation_summary(evaluation: &Evaluation) -> String {
 }
 
 /// Lines joined; no-break spaces become plain ones, so that the text can be searched and copied.
-fn ordinary_spaces(lines: &[String]) -> String {
+pub fn ordinary_spaces(lines: &[String]) -> String {
     let text: String = lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect();
     text.replace(['\u{a0}', '\u{202f}'], " ")
 }

@@ -46,6 +46,7 @@ fn a_servo_arm_without_torque_has_the_same_page_of_position() {
     let output = gapscope(dir.path(), ["diagnose", "robot.urdf", "log.csv", "--out", "servo"]);
     let told = said(&output);
     assert!(output.status.success() && told.contains("dry friction that the model lacks"), "{told}");
+    assert!(!told.contains(['\u{a0}', '\u{202f}']), "spaces are plain, so that the text can be searched: {told}");
     let file = dir.path().join("servo/report.html");
     let page = std::fs::read_to_string(&file).unwrap();
     for section in

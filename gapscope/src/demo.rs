@@ -1,11 +1,12 @@
 //! `gapscope demo`: a robot with an effect that the diagnosis is not told, diagnosed from its log files, then revealed.
 
-use crate::cli::{Demo, Input};
+use crate::cli::Input;
 use crate::diagnose::{with_progress, write};
 use crate::input::load;
 use crate::report::terminal::Paint;
 use crate::{output, summary};
 use anyhow::{Context, Result};
+use clap::Args;
 use gapscope_datasets::{Recipe, generate, write_csv};
 use gapscope_dynamics::{Model, robots};
 use gapscope_effects::{
@@ -17,7 +18,19 @@ use rand_pcg::Pcg64;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
+use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Arguments of `demo`.
+#[derive(Debug, Args)]
+pub struct Demo {
+    /// Which effect is withheld is drawn from this number [default: the time of day]
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Folder for the logs and the results [default: a new folder in the current one]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
 
 const EPISODES: u64 = 4;
 

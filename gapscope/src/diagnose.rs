@@ -1,17 +1,53 @@
 //! `gapscope diagnose`.
 
-use crate::cli::{Diagnose, Input};
+use crate::cli::Input;
 use crate::input::{Loaded, load_any};
-use crate::report::Setting;
 use crate::report::terminal::Paint;
+use crate::report::{Beside, Setting};
 use crate::trust::trusting;
 use crate::{output, report, servo, summary};
 use anyhow::{Context, Result};
-use gapscope_datasets::Bound;
+use clap::Args;
+use gapscope_datasets::{Bound, Trajectory};
 use gapscope_diagnosis::schema::Evidence;
 use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, Progress as Told, diagnose};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
+use std::path::PathBuf;
+
+/// Arguments of `diagnose`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope diagnose robot.urdf run1.csv run2.csv.gz
+  gapscope diagnose robot.urdf bag/ --topic /joint_states --out first
+  gapscope diagnose robot.urdf run.csv --map position.joint1=q1 --map effort.joint1=tau1
+  gapscope diagnose robot.urdf run_*.csv --quiet          three sentences, for a script or a chat")]
+pub struct Diagnose {
+    /// Robot and logs
+    #[command(flatten)]
+    pub input: Input,
+    /// Folder for diagnosis.json, report.html, corrected.json and next_experiment.csv [default: a new folder beside the first log]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    pub force: bool,
+    /// What is known of the servos, where logs hold no torque: gains, constants, limits, as numbers or ranges (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub drive: Option<PathBuf>,
+    /// How well the links' inertials are known: weighed, cad (the default) or guessed; or one link's, e.g. `link6=weighed`
+    #[arg(long, value_name = "[LINK=]SOURCE")]
+    pub trust: Vec<String>,
+    /// Print what was proposed, against what, and by how much the logs spoke for or against it
+    #[arg(long)]
+    pub why: bool,
+    /// Print the answer in three sentences and nothing else, without progress
+    #[arg(long, short, conflicts_with_all = ["why", "json"])]
+    pub quiet: bool,
+    /// Print diagnosis.json, as it is written beside, and nothing else
+    #[arg(long, conflicts_with = "why")]
+    pub json: bool,
+}
 
 /// Diagnoses and writes the results; returns what to print.
 ///
@@ -43,7 +79,7 @@ pub enum Found {
     /// Of a robot whose logs hold its torque.
     Torque(Box<Outcome>, Box<Setting>),
     /// Of a servo arm whose logs do not.
-    Servo(Box<gapscope_servo::Outcome>),
+    Servo(Box<gapscope_servo::Outcome>, Box<Beside>),
 }
 
 /// Diagnoses and writes nothing.
@@ -55,7 +91,8 @@ pub fn found(args: &Diagnose, progress: Told<'_>) -> Result<Found> {
     let mut loaded = load_any(&args.input, Some(Bound::DIAGNOSIS), &|word| progress(word, 0.0))?;
     loaded.model = trusting(loaded.model, &args.trust)?;
     if servo::lacks_effort(&loaded) {
-        return Ok(Found::Servo(Box::new(servo::diagnosed(args, loaded, progress)?)));
+        let (outcome, beside) = servo::diagnosed(args, &loaded, progress)?;
+        return Ok(Found::Servo(Box::new(outcome), Box::new(beside)));
     }
     let (outcome, setting) = diagnosed(loaded, &args.input, progress)?;
     Ok(Found::Torque(Box::new(outcome), Box::new(setting)))
@@ -69,7 +106,7 @@ impl Found {
     pub fn files(&self, out: &Path) -> Result<Vec<(&'static str, Option<String>)>> {
         match self {
             Found::Torque(outcome, setting) => files(outcome, setting, out),
-            Found::Servo(outcome) => servo::files(outcome),
+            Found::Servo(outcome, beside) => servo::files(outcome, beside, out),
         }
     }
 
@@ -80,7 +117,7 @@ impl Found {
     pub fn json(&self) -> Result<String> {
         Ok(match self {
             Found::Torque(outcome, _) => serde_json::to_string(&outcome.diagnosis)?,
-            Found::Servo(outcome) => serde_json::to_string(&outcome.diagnosis)?,
+            Found::Servo(outcome, _) => serde_json::to_string(&outcome.diagnosis)?,
         })
     }
 
@@ -88,7 +125,7 @@ impl Found {
     pub fn answer(&self, paint: &Paint) -> String {
         match self {
             Found::Torque(outcome, _) => summary::answer(&outcome.diagnosis, paint),
-            Found::Servo(outcome) => servo::answer(&outcome.diagnosis),
+            Found::Servo(outcome, _) => servo::answer(&outcome.diagnosis, paint),
         }
     }
 
@@ -98,7 +135,7 @@ impl Found {
             Found::Torque(outcome, _) => {
                 summary::summary(&outcome.diagnosis, out.map(|out| out.join("report.html")).as_deref(), paint)
             }
-            Found::Servo(outcome) => servo::summary(&outcome.diagnosis, out),
+            Found::Servo(outcome, _) => servo::summary(&outcome.diagnosis, out, paint),
         }
     }
 
@@ -111,7 +148,7 @@ impl Found {
     pub fn why(&self) -> String {
         match self {
             Found::Torque(outcome, _) => summary::why(&outcome.diagnosis),
-            Found::Servo(outcome) => servo::why(&outcome.diagnosis),
+            Found::Servo(outcome, _) => servo::why(&outcome.diagnosis),
         }
     }
 
@@ -122,7 +159,7 @@ impl Found {
                 let [place, which, how_far] = report::answer_sentences(&outcome.diagnosis, &outcome.evidence);
                 [which, place, how_far]
             }
-            Found::Servo(outcome) => servo::sentences(&outcome.diagnosis),
+            Found::Servo(outcome, _) => servo::sentences(&outcome.diagnosis),
         }
     }
 }
@@ -164,7 +201,8 @@ pub(crate) fn diagnosed(loaded: Loaded, input: &Input, progress: Told<'_>) -> Re
     outcome.evidence.robot_file = input.robot.display().to_string();
     outcome.evidence.logs = input.logs.iter().map(|l| l.display().to_string()).collect();
     let described = description.model(&input.robot, &held).ok();
-    let setting = Setting::new(&model, &episodes, &outcome.corrected, &description, described.as_ref());
+    let next = proposed(&outcome);
+    let setting = Setting::new(&model, &episodes, &outcome.corrected, next, &description, described.as_ref());
     Ok((outcome, setting))
 }
 
@@ -176,9 +214,14 @@ pub fn write(outcome: &Outcome, setting: &Setting, out: &Path) -> Result<()> {
     output::write_all(out, &files(outcome, setting, out)?)
 }
 
+/// The motion that the next experiment names, if it names one.
+fn proposed(outcome: &Outcome) -> Option<&Trajectory> {
+    outcome.diagnosis.next_experiment.as_ref()?.trajectory.as_ref()?;
+    outcome.trajectory.as_ref()
+}
+
 fn files(outcome: &Outcome, setting: &Setting, out: &Path) -> Result<Vec<(&'static str, Option<String>)>> {
-    let proposed = outcome.diagnosis.next_experiment.as_ref().and_then(|next| next.trajectory.as_ref());
-    let motion = proposed.zip(outcome.trajectory.as_ref()).map(|(_, trajectory)| trajectory.to_csv());
+    let motion = proposed(outcome).map(Trajectory::to_csv);
     let mut evidence = outcome.evidence.clone();
     evidence.corrected_file = out.join("corrected.json").display().to_string();
     Ok(vec![

@@ -1,13 +1,42 @@
 //! `gapscope evaluate`.
 
-use crate::cli::Evaluate;
+use crate::cli::Input;
 use crate::input::{load_any, strangeness, warn};
 use crate::{output, servo, summary};
 use anyhow::{Context, Result, bail};
+use clap::Args;
 use gapscope_datasets::Bound;
 use gapscope_diagnosis::{Corrected, Predictions, evaluate};
 use gapscope_dynamics::Model;
 use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Arguments of `evaluate`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope evaluate robot.urdf other.csv                                          the model as described
+  gapscope evaluate robot.urdf other.csv --with run1.gapscope/corrected.json      and with what was found
+  gapscope evaluate robot.urdf other.csv --with run1.gapscope/corrected.json --predictions predictions.csv")]
+pub struct Evaluate {
+    /// Robot and logs
+    #[command(flatten)]
+    pub input: Input,
+    /// Corrected model that `diagnose` wrote
+    #[arg(long, value_name = "FILE")]
+    pub with: Option<PathBuf>,
+    /// What is known of the servos, where logs hold no torque: gains, constants, limits, as numbers or ranges (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub drive: Option<PathBuf>,
+    /// Print one JSON object and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// Write measured, nominal and corrected torque to a CSV file
+    #[arg(long, value_name = "FILE")]
+    pub predictions: Option<PathBuf>,
+    /// Replace the predictions file if it exists
+    #[arg(long)]
+    pub force: bool,
+}
 
 /// Evaluates; returns what to print.
 ///

@@ -1,6 +1,8 @@
 //! `gapscope export`: the corrected model for simulators, with a ledger of what they hold.
 
-use crate::cli::{Export, Input, Kind};
+mod args;
+
+use crate::cli::{Input, Kind};
 use crate::input::Reading;
 use crate::learned::{self, Trained};
 use crate::robot::Description;
@@ -15,6 +17,8 @@ use gapscope_export::{
 };
 use std::fmt::Write;
 use std::path::PathBuf;
+
+pub use args::Export;
 
 /// Name of the ledger's file.
 const LEDGER: &str = "ledger.json";

@@ -1,6 +1,7 @@
 //! `gapscope generate`: logs of a simulated robot with known effects, with its URDF and the truth beside them.
 
-use crate::cli::Generate;
+mod args;
+
 use crate::output;
 use anyhow::{Context, Result, bail};
 use gapscope_datasets::{Episode, Perturbation, Recipe, Reference, Sensors, Trajectory, follow, generate, write_csv};
@@ -10,6 +11,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+
+pub use args::Generate;
 
 /// The public name of the schema of truth.json.
 const TRUTH_SCHEMA: &str = "gapscope.truth/1";

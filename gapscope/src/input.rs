@@ -1,6 +1,5 @@
 //! Robot and logs from the command line.
 
-use crate::cli::Input;
 use crate::robot::{self, Description};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -12,6 +11,40 @@ use gapscope_diagnosis::Origin;
 use gapscope_dynamics::{Finding, Model};
 use std::io::Write;
 use std::path::PathBuf;
+
+/// Which robot and logs.
+#[derive(Debug, Default, Args)]
+pub struct Input {
+    /// Robot description: URDF, xacro or MJCF
+    pub robot: PathBuf,
+    /// Logs: CSV, NumPy, MATLAB, Parquet, HDF5, MCAP, folders of ROS 2 bags and of LeRobot datasets
+    #[arg(required = true)]
+    pub logs: Vec<PathBuf>,
+    /// How both are read
+    #[command(flatten)]
+    pub reading: Reading,
+    /// Read this topic of a bag, instead of the one that is chosen; may be given several times
+    #[arg(long = "topic", value_name = "TOPIC")]
+    pub topic: Vec<String>,
+    /// Read these episodes of a dataset, e.g. `3` or `0-9,20`
+    #[arg(long, value_name = "RANGES")]
+    pub episodes: Option<String>,
+    /// Read positions of a LeRobot dataset as per cent of the ranges in this calibration file
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
+    /// Read a log that ends in the middle of a row up to its last whole row
+    #[arg(long)]
+    pub allow_truncated: bool,
+    /// Leave out logs that cannot be read instead of stopping
+    #[arg(long)]
+    pub skip_bad_logs: bool,
+    /// Take the logs as they are, where a wrong unit, sign, order, zero or clock was found
+    #[arg(long)]
+    pub as_logged: bool,
+    /// Logs in memory, in the place of files; `logs` then holds their names
+    #[arg(skip)]
+    pub arrays: Vec<gapscope_datasets::Arrays>,
+}
 
 /// How a robot and its logs are read, for every command that does.
 #[derive(Debug, Clone, Default, Args)]

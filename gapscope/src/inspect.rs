@@ -1,11 +1,12 @@
 //! `gapscope inspect`: what logs are like, what is wrong with them, and what they determine.
 
-use crate::cli::{Input, Inspect};
+use crate::cli::Input;
 use crate::input::{Reading, fault_line, load_any, options, read};
 use crate::report::terminal::{column, fill, pad};
 use crate::report::{count, figure, percent, plain};
 use crate::{output, robot};
 use anyhow::{Context, Result, bail};
+use clap::Args;
 use gapscope_datasets::{
     Bound, Doubt, Episode, Fault, LogTraits, ReadOptions, determined, inspect, joints_of, suggest_map,
 };
@@ -13,6 +14,39 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
+use std::path::PathBuf;
+
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// Logs, as `diagnose` reads them
+    #[arg(required = true)]
+    pub logs: Vec<PathBuf>,
+    /// Robot description to hold the logs against: URDF, xacro or MJCF
+    #[arg(long, value_name = "ROBOT")]
+    pub model: Option<PathBuf>,
+    /// Read a column of another name, e.g. `position.joint1=/joint_states/j1/pos`; may be given several times
+    #[arg(long = "map", value_name = "NATIVE=COLUMN")]
+    pub map: Vec<String>,
+    /// Read column names from a TOML file
+    #[arg(long, value_name = "FILE")]
+    pub map_file: Option<PathBuf>,
+    /// Read this topic of a bag; may be given several times
+    #[arg(long = "topic", value_name = "TOPIC")]
+    pub topic: Vec<String>,
+    /// Read these episodes of a dataset, e.g. `3` or `0-9,20`
+    #[arg(long, value_name = "RANGES")]
+    pub episodes: Option<String>,
+    /// Hold a joint of the robot fixed at zero; may be given several times
+    #[arg(long = "lock", value_name = "JOINT")]
+    pub lock: Vec<String>,
+    /// Write a column map for the first log from what its columns look like, and nothing else
+    #[arg(long, value_name = "FILE", requires = "model", conflicts_with = "json")]
+    pub suggest_map: Option<PathBuf>,
+    /// Print one JSON object and nothing else
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// What `--json` prints, schema `gapscope.inspection/1`.
 #[derive(Debug, Serialize)]

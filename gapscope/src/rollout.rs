@@ -1,17 +1,54 @@
 //! `gapscope rollout`: how the models' errors grow over the horizon, beside what one-step errors allow.
 
-use crate::cli::{Kind, Rollout};
+use crate::cli::{Input, Kind};
 use crate::input::{Loaded, load};
 use crate::learned;
 use crate::output;
 use crate::report::terminal::{fill, pad};
 use crate::report::{figure, plain, rollout_page, significant};
 use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
 use gapscope_diagnosis::{BoundGrowth, Contender, Corrected, ModelRollouts, RolloutOptions, rollouts};
 use gapscope_dynamics::Model;
 use indicatif::ProgressBar;
 use std::fmt::Write;
+use std::path::PathBuf;
 use std::time::Duration;
+
+/// Arguments of `rollout`.
+#[derive(Debug, Args)]
+pub struct Rollout {
+    /// Robot and logs
+    #[command(flatten)]
+    pub input: Input,
+    /// Corrected model that `diagnose` wrote
+    #[arg(long, value_name = "FILE")]
+    pub with: Option<PathBuf>,
+    /// Residual network that `train residual` wrote, on the robot's own model: its folder, or weights in it
+    #[arg(long, value_name = "DIR|FILE")]
+    pub residual: Option<PathBuf>,
+    /// Network alone that `train pure` wrote: its folder, or weights in it
+    #[arg(long, value_name = "DIR|FILE")]
+    pub pure: Option<PathBuf>,
+    /// Longest horizon, s
+    #[arg(long, allow_negative_numbers = true, default_value_t = 1.0)]
+    pub horizon: f64,
+    /// Position error over all joints at which a rollout has left the log, rad or m
+    #[arg(long, allow_negative_numbers = true, default_value_t = 0.05)]
+    pub tolerance: f64,
+    /// Fit each rollout's initial state to this many seconds of the log: for noisy logs
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
+    pub fit_start: Option<f64>,
+    /// Rollouts over all logs
+    #[arg(long, default_value_t = 240)]
+    pub starts: usize,
+    /// Page to write [default: rollout.html in a new folder beside the first log]
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Replace the page if it exists
+    #[arg(long)]
+    pub force: bool,
+}
 
 /// Rolls out; returns what to print.
 ///

@@ -2,7 +2,9 @@
 
 use crate::cli::{Diagnose, Evaluate};
 use crate::input::Loaded;
-use crate::report::{capital, joint_list};
+use crate::report::terminal::{Paint, clean, wrap};
+use crate::report::{self, Beside, joint_list};
+use crate::summary;
 use anyhow::{Context, Result, bail};
 use gapscope_servo::schema::{Change, Diagnosis, Estimate, Evaluation, FoundDrive, FoundEffect};
 use gapscope_servo::{Given, Outcome, Paths, ServoModel};
@@ -25,32 +27,38 @@ fn given(file: Option<&Path>, loaded: &Loaded) -> Result<Given> {
     Given::from_toml(&text, &joints).with_context(|| file.display().to_string())
 }
 
-/// Diagnoses a servo arm.
+/// Diagnoses a servo arm; beside it what its report says of robot and files.
 ///
 /// # Errors
 /// A `--drive` file that cannot be read.
-pub fn diagnosed(args: &Diagnose, loaded: Loaded, progress: &(dyn Fn(&str, f64) + Sync)) -> Result<Outcome> {
-    let given = given(args.drive.as_deref(), &loaded)?;
-    Ok(gapscope_servo::diagnose(&loaded.model, &loaded.episodes, &given, loaded.said(), progress)?)
+pub fn diagnosed(args: &Diagnose, loaded: &Loaded, progress: &(dyn Fn(&str, f64) + Sync)) -> Result<(Outcome, Beside)> {
+    let given = given(args.drive.as_deref(), loaded)?;
+    let outcome = gapscope_servo::diagnose(&loaded.model, &loaded.episodes, &given, loaded.said(), progress)?;
+    let name = |path: &Path| path.display().to_string();
+    let logs = args.input.logs.iter().map(|log| name(log)).collect();
+    let beside = Beside::of_files(loaded, name(&args.input.robot), logs, args.drive.as_deref().map(name));
+    let beside = beside.with(&loaded.model, &loaded.episodes, &outcome.evidence);
+    Ok((outcome, beside))
 }
 
-/// The files of its results.
+/// The files of its results in a folder.
 ///
 /// # Errors
 /// Numbers that JSON cannot hold.
-pub fn files(outcome: &Outcome) -> Result<Vec<(&'static str, Option<String>)>> {
+pub fn files(outcome: &Outcome, beside: &Beside, out: &Path) -> Result<Vec<(&'static str, Option<String>)>> {
+    let corrected = out.join("corrected.json").display().to_string();
     Ok(vec![
         ("diagnosis.json", Some(serde_json::to_string_pretty(&outcome.diagnosis)?)),
         ("corrected.json", Some(serde_json::to_string_pretty(&outcome.corrected)?)),
-        // A report of an earlier diagnosis in this folder would be of something else.
-        ("report.html", None),
+        ("report.html", Some(report::servo_html(outcome, beside, &corrected))),
     ])
 }
 
-/// The answer alone: what it is and how far it shrinks.
-pub fn answer(diagnosis: &Diagnosis) -> String {
-    let far = change(&diagnosis.shrink.position);
-    format!("{}\nHeld out, free run under the set points: {far}.", capital(&headline(diagnosis)))
+/// The answer alone, in three sentences.
+pub fn answer(diagnosis: &Diagnosis, paint: &Paint) -> String {
+    let lines = report::servo_answer(diagnosis);
+    let lines: Vec<String> = lines.iter().flat_map(|line| wrap(&clean(line), paint.width)).collect();
+    plain(&lines)
 }
 
 /// Which, where and how far, a sentence each.
@@ -155,7 +163,7 @@ fn counted(number: usize, what: &str) -> String {
 }
 
 /// The diagnosis in some lines.
-pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>) -> String {
+pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> String {
     let data = &diagnosis.data;
     let mut lines = vec![
         format!(
@@ -200,15 +208,14 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>) -> String {
         lines.push(format!("         and {} more, in diagnosis.json", data.findings.len() - FINDINGS));
     }
     if let Some(out) = out {
-        lines.push(format!("Results  {}", out.display()));
+        lines.push(format!("Report   {}", out.join("report.html").display()));
     }
-    plain(&lines)
+    format!("{}\n{}", answer(diagnosis, paint), plain(&lines))
 }
 
 /// Lines joined, free of control characters: a log's words cannot steer the terminal.
 fn plain(lines: &[String]) -> String {
-    let clean = |line: &String| line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
-    lines.iter().map(|line| format!("{}\n", clean(line).trim_end())).collect()
+    summary::ordinary_spaces(&lines.iter().map(|line| clean(line)).collect::<Vec<_>>())
 }
 
 fn headline(diagnosis: &Diagnosis) -> String {
@@ -244,12 +251,7 @@ fn parameters(found: &FoundEffect) -> Vec<String> {
 }
 
 fn driven(drive: &FoundDrive) -> String {
-    let follows = match drive.follows {
-        gapscope_servo::Signal::Command => "set point",
-        gapscope_servo::Signal::Voltage => "voltage",
-        gapscope_servo::Signal::Current => "current",
-        gapscope_servo::Signal::Effort => "effort",
-    };
+    let follows = report::servo_follows(drive);
     let cell = |(name, e): (&String, &Estimate)| {
         let known = if drive.given.contains(name) { " (given)" } else { "" };
         format!("{} {}{known}", name.replace('_', " "), estimate(e))

@@ -7,7 +7,7 @@ use crate::input::fault_line;
 use crate::report::plain::{self, combination, together};
 use crate::report::terminal::{INDENT, Paint, block, blocks, clean, column, fill, pad, wrap};
 use crate::report::{
-    NONE, capital, changed, count, effect, estimate, figure, headline, implied_unit, interval, is_above_floor,
+    NONE, capital, changed, count, effect, effects, estimate, figure, headline, implied_unit, interval, is_above_floor,
     joint_list, largest, motion_unit, outstanding, percent, percent_figure, plain as rounded, power_line,
     probability_figure, regime, said_of, significant, span, verdict, with_unit, words_of_the_rest,
 };
@@ -107,7 +107,7 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
 fn ties(diagnosis: &Diagnosis) -> Vec<String> {
     let tied = diagnosis.effects.iter().filter(|found| !found.indistinguishable_from.is_empty());
     tied.map(|found| {
-        let kinds: Vec<String> = found.indistinguishable_from.iter().map(|kind| effect(kind)).collect();
+        let kinds = effects(&found.indistinguishable_from);
         clean(&format!("{} could also be {}", effect(&found.kind), kinds.join(" or ")))
     })
     .collect()
@@ -175,7 +175,7 @@ pub fn evaluation_summary(evaluation: &Evaluation) -> String {
 }
 
 /// Lines joined; no-break spaces become plain ones, so that the text can be searched and copied.
-fn ordinary_spaces(lines: &[String]) -> String {
+pub fn ordinary_spaces(lines: &[String]) -> String {
     let text: String = lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect();
     text.replace(['\u{a0}', '\u{202f}'], " ")
 }

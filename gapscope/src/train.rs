@@ -1,12 +1,13 @@
 //! `gapscope train`: a residual on the robot's model, or a pure network, from logs.
 
-use crate::cli::{Kind, Train};
+use crate::cli::Input;
 use crate::input::{Loaded, load};
 use crate::output;
 use crate::picture::{Series, svg};
 use crate::report::axis::Axis;
 use crate::report::figure;
 use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
 use gapscope_datasets::transitions;
 use gapscope_diagnosis::Corrected;
 use gapscope_dynamics::{Model, StepModel, Transitions};
@@ -18,6 +19,84 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::PathBuf;
+
+/// What is trained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// f_hyb = f_phys + r
+    Residual,
+    /// x⁺ = x + f(x, τ)
+    Pure,
+}
+
+impl Kind {
+    /// Name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        if self == Kind::Residual { "residual" } else { "pure" }
+    }
+}
+
+/// Arguments of `train`.
+#[derive(Debug, Args)]
+pub struct Train {
+    /// What to train
+    #[arg(value_enum)]
+    pub kind: Kind,
+    /// Robot and logs
+    #[command(flatten)]
+    pub input: Input,
+    /// Folder for weights, learning curve and record [default: a new folder beside the first log]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    pub force: bool,
+    /// What a residual corrects: next-state, acceleration or torque [default: next-state]
+    #[arg(long, value_parser = on, value_name = "WHAT")]
+    pub on: Option<On>,
+    /// Corrected model that `diagnose` wrote, as the physics below a residual [default: the robot as described]
+    #[arg(long, value_name = "FILE")]
+    pub with: Option<PathBuf>,
+    /// Reference configuration: two-hidden-128 or one-hidden-64
+    #[arg(long, default_value = "two-hidden-128", value_name = "NAME")]
+    pub reference: String,
+    /// Sizes of the hidden layers, e.g. 128,128, instead of the reference's
+    #[arg(long, value_delimiter = ',', value_name = "SIZES")]
+    pub hidden: Vec<usize>,
+    /// Passes over the data
+    #[arg(long, default_value_t = 100)]
+    pub epochs: usize,
+    /// Steps an update sees [default: the reference's 64]
+    #[arg(long)]
+    pub batch: Option<usize>,
+    /// Adam's learning rate [default: the reference's 0.001]
+    #[arg(long, allow_negative_numbers = true)]
+    pub rate: Option<f64>,
+    /// Let the learning rate fall to zero along half a cosine
+    #[arg(long)]
+    pub cosine: bool,
+    /// Weight of the residual's mean square [default: the reference's 0.001]
+    #[arg(long, allow_negative_numbers = true)]
+    pub penalty: Option<f64>,
+    /// Stop after so many epochs without a better held-out loss
+    #[arg(long)]
+    pub patience: Option<usize>,
+    /// Time of a step, s
+    #[arg(long, allow_negative_numbers = true, default_value_t = gapscope_network::Learner::DT)]
+    pub dt: f64,
+    /// Draws initial weights and the order of the data
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+}
+
+fn on(text: &str) -> Result<On, String> {
+    match text {
+        "next-state" => Ok(On::NextState),
+        "acceleration" => Ok(On::Acceleration),
+        "torque" => Ok(On::Torque),
+        _ => Err("expected next-state, acceleration or torque".into()),
+    }
+}
 
 /// Part of each log, at its end, that is held out.
 const HELD_OUT: f64 = 0.2;

@@ -3,6 +3,7 @@
 
 use crate::arm::simulate_arm;
 use crate::choose::{Chosen, choose, weigh};
+use crate::evidence::Evidence;
 use crate::fit::fit;
 use crate::gap::{self, Errors};
 use crate::given::Given;
@@ -36,6 +37,8 @@ pub struct Outcome {
     pub diagnosis: Diagnosis,
     /// The corrected arm.
     pub corrected: ServoModel,
+    /// What a report draws.
+    pub evidence: Evidence,
 }
 
 /// Diagnoses a servo arm from logs that may lack its torque. `findings` are those of reading.
@@ -122,7 +125,8 @@ pub fn diagnose(
         why,
         next_experiment: None,
     };
-    Ok(Outcome { diagnosis, corrected })
+    let evidence = Evidence::new(&before, &after, &all);
+    Ok(Outcome { diagnosis, corrected, evidence })
 }
 
 fn refs(errors: &Errors) -> Vec<&Vec<Vec<f64>>> {
@@ -474,13 +478,6 @@ pub fn evaluate(
         after: after.as_ref().map(|after| gap::by_joint(after, &all)).unwrap_or_default(),
         logs,
     };
-    let paths = changed
-        .iter()
-        .enumerate()
-        .map(|(log, errors)| {
-            let rows = errors.iter().zip(&all);
-            rows.map(|(e, joint)| e.iter().zip(&joint.runs[log].position).map(|(e, q)| q + e).collect()).collect()
-        })
-        .collect();
+    let paths = gap::paths(changed, &all);
     Ok((evaluation, paths))
 }

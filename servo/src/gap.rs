@@ -23,6 +23,15 @@ pub fn errors(paths: &[Vec<Vec<f64>>], joints: &[Joint]) -> Errors {
     paths.iter().enumerate().map(of).collect()
 }
 
+/// The paths that have these errors, `[log][joint][sample]`, rad.
+pub fn paths(errors: &Errors, joints: &[Joint]) -> Errors {
+    let of = |(log, errors): (usize, &Vec<Vec<f64>>)| {
+        let rows = errors.iter().zip(joints);
+        rows.map(|(row, joint)| row.iter().zip(&joint.runs[log].position).map(|(e, q)| q + e).collect()).collect()
+    };
+    errors.iter().enumerate().map(of).collect()
+}
+
 fn mean_square(rows: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = rows.fold((0.0, 0.0), |(sum, count), e| (sum + e * e, count + 1.0));
     sum / f64::max(count, 1.0)

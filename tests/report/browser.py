@@ -5,7 +5,8 @@
 
 Each page is opened from its folder, without a network, at three sizes, light and dark. Checked: no error on the console,
 no request to anywhere, no sideways scrolling, text readable against what is behind it (WCAG AA). Of a report also: turning
-the robot, the filter by joint and the zoom, by pointer and by key, and that it says the same without JavaScript.
+the robot, the filter by joint and the zoom, by pointer and by key, what plays, that it says the same without JavaScript, and
+how it prints.
 With --index the page is one that `gapscope report` wrote. Exit status 0 if all is well, 1 if not, 77 if there is no browser.
 """
 
@@ -78,6 +79,7 @@ def main():
                     faults += [f"{name}: {fault}" for fault in check(browser, file, size, scheme, args)]
             if not args.index:
                 faults += [f"{file}: {fault}" for fault in check_without_script(browser, file)]
+                faults += [f"{file} on paper: {fault}" for fault in check_print(browser, file, args)]
         browser.close()
     for fault in faults:
         print(fault)
@@ -188,11 +190,34 @@ def use_report(page):
             if not page.evaluate(filtered):
                 faults.append("a click on a joint of the robot filters nothing")
             page.locator("#filter button").click()
+        stands = "[...document.querySelectorAll('#skeleton line')].map((l) => l.getAttribute('x2') + l.getAttribute('y2')).join()"
         for button in page.locator("[data-play]").all():
+            name, still = button.inner_text(), page.evaluate(stands)
             button.click()
-            page.wait_for_timeout(120)
-            button.click()
+            if button.inner_text() != "Stop":
+                faults.append(f"{name}: does not play")
+            # A log may begin at rest.
+            for _ in range(25):
+                page.wait_for_timeout(200)
+                if page.evaluate(stands) != still:
+                    break
+            else:
+                faults.append(f"{name}: nothing moves")
+            if not page.locator("#skeleton").is_visible() or not in_sight(page, "#skeleton"):
+                faults.append(f"{name}: the robot that moves is out of sight")
+            button.focus()
+            # A short log may end by itself just before the key, which then plays it again.
+            for _ in range(3):
+                if button.inner_text() == "Stop":
+                    page.keyboard.press("Enter")
+            if button.inner_text() != name:
+                faults.append(f"{name}: Enter does not stop it")
     return faults
+
+
+def in_sight(page, selector):
+    box = page.locator(selector).bounding_box()
+    return box["y"] + box["height"] > 0 and box["y"] < page.viewport_size["height"]
 
 
 def ticks(_page):
@@ -241,6 +266,32 @@ def check_without_script(browser, file):
         context.close()
     if texts[0] != texts[1] or not texts[0].strip():
         faults.append("the answer is another without JavaScript")
+    return faults
+
+
+def check_print(browser, file, args):
+    """A dark screen prints light, whole and without controls on A4 (703 px between its margins)."""
+    context = browser.new_context(viewport={"width": 703, "height": 1000}, color_scheme="dark", offline=True)
+    page = context.new_page()
+    page.goto(file.resolve().as_uri())
+    page.wait_for_timeout(150)
+    page.emulate_media(media="print", color_scheme="dark")
+    faults = []
+    ground = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    if ground != "rgb(255, 255, 255)":
+        faults.append(f"the ground is {ground}")
+    controls = page.locator("button, select, .tools, #live, #filter").all()
+    if any(control.is_visible() for control in controls):
+        faults.append("controls show")
+    folded = "[...document.querySelectorAll('details > :not(summary)')].filter((e) => !e.closest('.needs-script') && !e.checkVisibility({ contentVisibilityAuto: true })).length"
+    if page.evaluate(folded):
+        faults.append("something stays folded")
+    cut = "[...document.querySelectorAll('.plot, .skeleton svg, .bars, .heat, table')].filter((e) => e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.className.baseVal ?? e.className)"
+    if cut := page.evaluate(cut):
+        faults.append(f"cut at the edge: {cut}")
+    if args.shots:
+        page.pdf(path=args.shots / f"{file.resolve().parent.name}.pdf", format="A4", prefer_css_page_size=True)
+    context.close()
     return faults
 
 

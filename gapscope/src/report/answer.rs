@@ -167,7 +167,7 @@ fn named(effect: &FoundEffect, all: &[String], spelled_out: usize) -> String {
         parameters.iter().filter_map(|(name, p)| value(&effect.kind, name, p)).take(spelled_out).collect();
     details.push(format!("confidence {}\u{202f}%", probability_figure(effect.confidence)));
     if !effect.indistinguishable_from.is_empty() {
-        let kinds: Vec<String> = effect.indistinguishable_from.iter().map(|kind| words::effect(kind)).collect();
+        let kinds = words::effects(&effect.indistinguishable_from);
         details.push(format!("not to be told from {} by these logs", words::list(&kinds, "or")));
     }
     format!("{}{place} ({})", words::effect(&effect.kind), details.join(", "))

@@ -1,12 +1,20 @@
 //! Each effect's law at each joint, over the data that it was fitted to.
 
 use super::axis::{Axis, extent};
-use super::chart::{Plot, dots, line};
-use super::format::count;
+use super::chart::{Plot, band, dots, line};
+use super::format::{count, numbers};
 use super::words;
-use gapscope_diagnosis::schema::{Diagnosis, EffectCurve, Evidence};
+use gapscope_diagnosis::schema::{EffectCurve, Evidence, FoundEffect, Parameter};
 use maud::{Markup, html};
 
+/// Effects whose torque is in proportion to one parameter: its interval is a band around their law.
+const PROPORTIONAL: [(&str, &str); 5] = [
+    ("coulomb_friction", "coulomb"),
+    ("viscous_friction", "viscous"),
+    ("load_dependent_friction", "load_coefficient"),
+    ("armature", "armature"),
+    ("torque_bias", "bias"),
+];
 /// Curves shown at once; the rest folds away.
 const FIRST: usize = 12;
 /// Dots of one curve.
@@ -16,25 +24,79 @@ const STRETCHES: usize = 160;
 /// Dots of all curves together.
 const ALL_DOTS: usize = 40_000;
 
-/// Small multiples, the most important first, or a sentence where there are none.
-pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
-    let drawn: Vec<&EffectCurve> = evidence.curves.iter().filter(|c| !c.law.is_empty() || !c.data.is_empty()).collect();
+/// The law of one effect at one joint.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Curve {
+    /// Public name of the effect.
+    pub kind: String,
+    /// Joint name.
+    pub joint: String,
+    /// Quantity on the horizontal axis with its unit, e.g. `speed, rad/s`.
+    pub x_label: String,
+    /// Unit of the torque on the vertical axis.
+    pub unit: String,
+    /// The data behind it, where logs hold torque.
+    pub data: Vec<[f64; 2]>,
+    /// The fitted law, sorted by the horizontal value.
+    pub law: Vec<[f64; 2]>,
+    /// Where the law lies within its parameters' intervals: horizontal value, least, greatest. Empty where it is not known.
+    pub band: Vec<[f64; 3]>,
+}
+
+impl From<&EffectCurve> for Curve {
+    fn from(curve: &EffectCurve) -> Curve {
+        let EffectCurve { kind, joint, x_label, unit, data, law } = curve.clone();
+        let unit = if unit.is_empty() { "N m".into() } else { unit };
+        Curve { kind, joint, x_label, unit, data, law: smooth(&law), band: vec![] }
+    }
+}
+
+/// The laws of a diagnosis, each with a band where it is known.
+pub fn of(evidence: &Evidence, effects: &[FoundEffect]) -> Vec<Curve> {
+    let with_band = |drawn: &EffectCurve| {
+        let mut curve = Curve::from(drawn);
+        if let Some(ends) = ends(effects, &curve.kind, &curve.joint) {
+            let at = |[x, y]: [f64; 2]| {
+                let [a, b] = ends.map(|end| end * y);
+                [x, a.min(b), a.max(b)]
+            };
+            curve.band = curve.law.iter().map(|point| at(*point)).collect();
+        }
+        curve
+    };
+    evidence.curves.iter().map(with_band).collect()
+}
+
+/// Ends of a law's parameter as parts of its value, where the law is in proportion to that one.
+fn ends(effects: &[FoundEffect], kind: &str, joint: &str) -> Option<[f64; 2]> {
+    let (_, name) = PROPORTIONAL.iter().find(|(of, _)| *of == kind)?;
+    let of_joint = |effect: &FoundEffect| match effect.parameters.get(*name)? {
+        Parameter::PerJoint(map) => map.get(joint).cloned(),
+        Parameter::Single(one) => Some(one.clone()),
+    };
+    let found = effects.iter().filter(|effect| effect.kind == kind).find_map(of_joint)?;
+    let scalar = |quantity| <[f64; 1]>::try_from(numbers(quantity)).ok();
+    let ([value], [low], [high]) = (scalar(&found.value)?, scalar(&found.ci95[0])?, scalar(&found.ci95[1])?);
+    let parts = [low / value, high / value];
+    parts.iter().all(|part| part.is_finite()).then_some(parts)
+}
+
+/// Small multiples, the most important first, or `none` where there are none. `joints` are in the robot's order.
+pub fn render(curves: &[Curve], joints: &[String], none: &str) -> Markup {
+    let drawn: Vec<&Curve> = curves.iter().filter(|c| !c.law.is_empty() || !c.data.is_empty()).collect();
     if drawn.is_empty() {
-        let why = if diagnosis.effects.is_empty() {
-            "No effect was found, so there is no law to draw."
-        } else {
-            "No curves were kept for this report."
-        };
-        return html! { p.muted { (why) } };
+        return html! { p.muted { (none) } };
     }
     let most = (ALL_DOTS / drawn.len()).clamp(50, DOTS);
-    let chosen = choose(&drawn, &diagnosis.joints);
-    let folded: Vec<&EffectCurve> =
-        drawn.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).map(|(_, c)| *c).collect();
+    let chosen = choose(&drawn, joints);
+    let folded: Vec<&Curve> = drawn.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).map(|(_, c)| *c).collect();
     html! {
         p.legend {
-            span.swatch.dot {} " data: measured torque less the model and all other effects"
+            @if drawn.iter().any(|c| !c.data.is_empty()) {
+                span.swatch.dot {} " data: measured torque less the model and all other effects"
+            }
             span.swatch.after {} " fitted law"
+            @if drawn.iter().any(|c| !c.band.is_empty()) { span.swatch.band {} " where it lies within the 95 % intervals" }
         }
         div.grid-three { @for &i in &chosen { (curve(drawn[i], most)) } }
         @if !folded.is_empty() {
@@ -46,22 +108,33 @@ pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
     }
 }
 
-fn curve(curve: &EffectCurve, most: usize) -> Markup {
-    let unit = if curve.unit.is_empty() { "N m" } else { &curve.unit };
+fn curve(curve: &Curve, most: usize) -> Markup {
+    let unit = &curve.unit;
     let stride = curve.data.len().div_ceil(most).max(1);
     let data: Vec<[f64; 2]> = curve.data.iter().copied().step_by(stride).collect();
     let x = Axis::tight(curve.data.iter().chain(&curve.law).map(|p| p[0]), &curve.x_label, 5);
-    let bulk = bulk(&curve.data);
-    let y = Axis::padded(curve.law.iter().map(|p| p[1]).chain(bulk).chain([0.0]), &format!("torque, {unit}"), 4);
+    let ends = curve.band.iter().flat_map(|p| [p[1], p[2]]);
+    let values = curve.law.iter().map(|p| p[1]).chain(bulk(&curve.data)).chain(ends).chain([0.0]);
+    let y = Axis::padded(values, &format!("torque, {unit}"), 4);
     let [from, to] = y.range();
     let beyond = curve.data.iter().filter(|p| p[1] < from || p[1] > to).count();
     let name = words::capital(&words::effect(&curve.kind));
+    let behind = match (curve.data.is_empty(), curve.band.is_empty()) {
+        (false, true) => "fitted law and data",
+        (false, false) => "fitted law, its interval as a band, and data",
+        (true, false) => "fitted law and its interval as a band",
+        (true, true) => "fitted law",
+    };
     html! {
         figure data-joints=(super::listed(std::slice::from_ref(&curve.joint))) {
-            figcaption { b { (name) } span { (curve.joint) } }
+            figcaption { b { (name) } span.name title=(curve.joint) { (curve.joint) } }
             (Plot {
-                description: format!("{name} at {}: fitted law and data, torque in {unit} over {}", curve.joint, curve.x_label),
-                marks: html! { (dots(data, &x, &y, "data")) (line(smooth(&curve.law), &[], &x, &y, "after law")) },
+                description: format!("{name} at {}: {behind}, torque in {unit} over {}", curve.joint, curve.x_label),
+                marks: html! {
+                    (dots(data, &x, &y, "data"))
+                    @if !curve.band.is_empty() { (band(&curve.band, &x, &y, "after")) }
+                    (line(curve.law.iter().copied(), &[], &x, &y, "after law"))
+                },
                 x: x.clone(), y: y.clone(), class: "medium", rules: vec![], x_labels: true,
             }.render())
             @if beyond > 0 { p.note { (count(beyond, "point")) " beyond the axis" } }
@@ -94,7 +167,7 @@ fn bulk(data: &[[f64; 2]]) -> Vec<f64> {
 }
 
 /// Indices of the curves shown at once, in order: effects take turns, each with its largest law first.
-fn choose(curves: &[&EffectCurve], joints: &[String]) -> Vec<usize> {
+fn choose(curves: &[&Curve], joints: &[String]) -> Vec<usize> {
     let span = |i: &usize| {
         let values = curves[*i].law.iter().map(|p| p[1]).filter(|v| v.is_finite());
         let (from, to) = values.fold((0.0, 0.0), |(a, b): (f64, f64), v| (a.min(v), b.max(v)));
@@ -129,4 +202,25 @@ fn choose(curves: &[&EffectCurve], joints: &[String]) -> Vec<usize> {
         (kind, joints.iter().position(|joint| *joint == curves[i].joint), i)
     });
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn the_interval_of_a_parameter_is_a_band_around_its_law() {
+        let (_, diagnosis, evidence) = sample::explained();
+        let curves = of(&evidence, &diagnosis.effects);
+        let friction = curves.iter().find(|c| c.kind == "coulomb_friction" && c.joint == "panda_joint2").unwrap();
+        // 1.51 N m, from 1.469 to 1.551.
+        for ([_, y], [_, low, high]) in friction.law.iter().zip(&friction.band) {
+            let ends = [1.469 / 1.51 * y, 1.551 / 1.51 * y];
+            assert!((low - ends[0].min(ends[1])).abs() < 1e-3 && (high - ends[0].max(ends[1])).abs() < 1e-3);
+        }
+        assert_eq!(friction.law.len(), friction.band.len());
+        // A payload's law hangs on mass, place and inertia: no one interval is a band.
+        assert!(curves.iter().filter(|c| c.kind == "payload").all(|c| c.band.is_empty()));
+    }
 }

@@ -3,17 +3,17 @@
 use super::chart::short;
 use super::format::{self, percent, percent_interval, with_unit};
 use super::words;
-use gapscope_diagnosis::schema::{Diagnosis, Estimate, FoundEffect, Parameter};
+use gapscope_diagnosis::schema::{Estimate, FoundEffect, Parameter};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
 /// Most parameters whose intervals are drawn beside the figures.
 const DRAWN: usize = 3;
 
-/// The table, or a plain word where there is nothing in it.
-pub fn render(diagnosis: &Diagnosis) -> Markup {
-    if diagnosis.effects.is_empty() {
-        return html! { p.none { "None. " span.muted { (words::nothing_found(diagnosis.verdict)) } } };
+/// The table, or a plain word where there is nothing in it. `shrinks` heads the column of what the gap loses by each.
+pub fn render(effects: &[FoundEffect], joints: &[String], shrinks: &str, nothing: &str) -> Markup {
+    if effects.is_empty() {
+        return html! { p.none { "None. " span.muted { (nothing) } } };
     }
     html! {
         table.effects {
@@ -23,17 +23,17 @@ pub fn render(diagnosis: &Diagnosis) -> Markup {
                     th scope="col" { "effect" }
                     th scope="col" { "joints" }
                     th scope="col" { "confidence" }
-                    th.number scope="col" { "alone, torque gap shrinks by" span.muted { " [95 %]" } }
+                    th.number scope="col" { (shrinks) span.muted { " [95 %]" } }
                     th scope="col" { "cannot be told from" }
                 }
             }
-            @for effect in &diagnosis.effects { (row(effect, &diagnosis.joints)) }
+            @for effect in effects { (row(effect, joints, shrinks)) }
         }
     }
 }
 
-fn row(effect: &FoundEffect, all: &[String]) -> Markup {
-    let apart: Vec<String> = effect.indistinguishable_from.iter().map(|kind| words::effect(kind)).collect();
+fn row(effect: &FoundEffect, all: &[String], shrinks: &str) -> Markup {
+    let apart = words::effects(&effect.indistinguishable_from);
     html! {
         tbody data-joints=(super::listed(&effect.joints)) {
             tr.effect {
@@ -44,7 +44,7 @@ fn row(effect: &FoundEffect, all: &[String]) -> Markup {
                 }
                 td.joints data-label="joints" title=(effect.joints.join(", ")) { (words::joints(&effect.joints, all)) }
                 td.nowrap data-label="confidence" { (meter(effect.confidence)) " " (format::probability_figure(effect.confidence)) "\u{202f}%" }
-                td.number data-label="alone, torque gap shrinks by" {
+                td.number data-label=(shrinks) {
                     (effect.shrink.torque.map_or("at the floor".into(), percent))
                     @if let Some(interval) = effect.shrink.ci95 { " " span.muted.nowrap { (percent_interval(interval)) } }
                 }
@@ -112,7 +112,7 @@ fn joint_table(parameters: &[(&String, &BTreeMap<String, Estimate>)], all: &[Str
                             }
                             @if drawn {
                                 td.interval aria-hidden="true" {
-                                    @if let Some(estimate) = map.get(joint) { (interval(estimate, reach(map))) }
+                                    @if let Some(estimate) = map.get(joint) { (interval(estimate, reach(map, &estimate.unit))) }
                                 }
                             }
                         }
@@ -123,9 +123,10 @@ fn joint_table(parameters: &[(&String, &BTreeMap<String, Estimate>)], all: &[Str
     }
 }
 
-/// Smallest and largest end of the intervals of a parameter, zero included.
-fn reach(map: &BTreeMap<String, Estimate>) -> [f64; 2] {
-    let ends = map.values().flat_map(|e| e.ci95.iter().chain([&e.value]).flat_map(format::numbers));
+/// Smallest and largest end of the intervals of a parameter in one unit, zero included.
+fn reach(map: &BTreeMap<String, Estimate>, unit: &str) -> [f64; 2] {
+    let ends = map.values().filter(|e| e.unit == unit);
+    let ends = ends.flat_map(|e| e.ci95.iter().chain([&e.value]).flat_map(format::numbers));
     let ends = ends.filter(|v| v.is_finite());
     ends.fold([0.0, 0.0], |[from, to], v| [f64::min(from, v), f64::max(to, v)])
 }

@@ -5,6 +5,8 @@ use gapscope_diagnosis::schema::{Estimate, Quantity};
 
 /// What stands where there is no figure.
 pub const NONE: &str = "–";
+/// What stands for the end of an interval that the logs do not bound.
+const OPEN: &str = "open";
 
 /// An estimate ready for print: value, interval and unit share one scale and one number of decimals.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -153,8 +155,14 @@ pub fn estimate(estimate: &Estimate) -> Printed {
     for (i, &value) in values.iter().enumerate() {
         let ends = [low.get(i).copied(), high.get(i).copied()].map(|end| end.unwrap_or(f64::NAN));
         components.push(scale.print(value, size, narrowest));
-        let [from, to] = ends.map(|end| scale.print(end, size, narrowest));
-        interval.push(if from == NONE || to == NONE { NONE.into() } else { format!("[{from},\u{a0}{to}]") });
+        // An end that is infinite is one that the logs do not bound.
+        let print = |end: f64| if end.is_infinite() { OPEN.into() } else { scale.print(end, size, narrowest) };
+        let [from, to] = ends.map(print);
+        interval.push(if from == NONE || to == NONE || (from == OPEN && to == OPEN) {
+            NONE.into()
+        } else {
+            format!("[{from},\u{a0}{to}]")
+        });
         half_width.push(significant(scale.factor * half(i), 2));
     }
     let value = match components.as_slice() {
@@ -164,11 +172,14 @@ pub fn estimate(estimate: &Estimate) -> Printed {
     Printed { value, interval, half_width, components, unit: scale.unit }
 }
 
-/// Smallest to largest of several estimates, `0.24–1.51 N m`; `None` where none is a number.
+/// Smallest to largest of several estimates, `0.24–1.51 N m`; `None` where none is a number, or their units differ.
 pub fn span<'a>(estimates: impl IntoIterator<Item = &'a Estimate>) -> Option<String> {
     let mut unit = "";
     let mut values: Vec<f64> = vec![];
-    for estimate in estimates {
+    for (i, estimate) in estimates.into_iter().enumerate() {
+        if i > 0 && estimate.unit != unit {
+            return None;
+        }
         unit = &estimate.unit;
         values.extend(numbers(&estimate.value).into_iter().filter(|v| v.is_finite()));
     }

@@ -83,10 +83,7 @@ impl From<&gapscope_servo::schema::Diagnosis> for Found {
             verdict: words::capital(&found.verdict.replace('_', " ")),
             effects: list.map(|e| words::effect(&e.kind)).collect(),
             sure: found.effects.first().map(|e| e.confidence),
-            answer: vec![format!(
-                "The free run under the set points is off by {} before and {} after.",
-                gaps[0].1, gaps[1].1
-            )],
+            answer: super::servo_answer(found).into(),
             gap: gaps,
             left: found.unexplained.fraction,
             faults: vec![],

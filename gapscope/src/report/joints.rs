@@ -1,50 +1,42 @@
-//! Torque gap of each joint against the noise floor, before and after.
+//! Gap of each joint against the noise floor, before and after.
 
 use super::bars::{self, Bar};
 use super::format::{NONE, significant, with_interval, with_unit};
-use super::words;
-use gapscope_diagnosis::schema::{Diagnosis, Evidence, TorqueGap};
+use super::gauge::{Figure, Gauge, JointGap};
 use maud::{Markup, html};
 
 /// The table of bars.
-pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
-    let before = &diagnosis.gap.torque;
-    let after = evidence.remaining.as_ref().map(|gap| &gap.torque);
-    if before.rms.is_empty() {
-        return html! { p.muted { "No torque gap was evaluated." } };
+pub fn render(gauge: &Gauge) -> Markup {
+    let after = gauge.has_after();
+    if gauge.joints.iter().all(|joint| joint.before.is_none()) {
+        return html! { p.muted { "No " (gauge.what) " gap was evaluated." } };
     }
     html! {
         p.legend {
-            span.swatch.before {} " before (model as described)"
-            @if after.is_some() { span.swatch.after {} " after (effects added)" }
+            span.swatch.before {} " before (" (gauge.nominal) ")"
+            @if after { span.swatch.after {} " after (" (gauge.corrected) ")" }
             span.swatch.floor {} " noise floor of the log"
-            span.swatch.whisker {} " 95 % interval"
+            @if gauge.joints.iter().any(|joint| joint.before.is_some_and(|gap| gap.ci95.is_some())) {
+                span.swatch.whisker {} " 95 % interval"
+            }
         }
-        div class={ "rows" @if after.is_none() { " four" } @else { " six" } } role="table" aria-label="Torque gap of each joint" {
+        div class={ "rows" @if after { " six" } @else { " four" } } role="table" aria-label={ "The " (gauge.what) " gap of each joint" } {
             div.row.head role="row" {
                 span role="columnheader" { "joint" }
-                span role="columnheader" { "torque gap, rms" }
+                span role="columnheader" { (gauge.what) " gap, rms" }
                 span role="columnheader" { "before" }
-                @if after.is_some() { span role="columnheader" { "after" } span role="columnheader" { "times less" } }
+                @if after { span role="columnheader" { "after" } span role="columnheader" { "times less" } }
                 span role="columnheader" { "floor" }
             }
-            @for joint in &diagnosis.joints {
-                @if before.rms.contains_key(joint) { (row(joint, diagnosis, after, evidence)) }
-            }
+            @for joint in gauge.joints.iter().filter(|joint| joint.before.is_some()) { (row(joint, gauge, after)) }
         }
     }
 }
 
-fn row(joint: &str, diagnosis: &Diagnosis, after: Option<&TorqueGap>, evidence: &Evidence) -> Markup {
-    let before = &diagnosis.gap.torque;
-    let unit = words::torque_unit(joint, evidence, &diagnosis.gap.regimes);
-    let floor = before.floor.get(joint).copied();
-    let bar = |gap: &TorqueGap, class| {
-        let value = gap.rms.get(joint).copied()?;
-        Some(Bar { value, interval: gap.ci95.get(joint).copied(), class })
-    };
-    let first = bar(before, "before");
-    let second = after.and_then(|gap| bar(gap, "after"));
+fn row(gap: &JointGap, gauge: &Gauge, after: bool) -> Markup {
+    let (joint, unit, floor) = (&gap.name, gap.unit.as_str(), gap.floor);
+    let bar = |figure: Option<Figure>, class| figure.map(|f| Bar { value: f.value, interval: f.ci95, class });
+    let (first, second) = (bar(gap.before, "before"), bar(gap.after, "after"));
     let bars: Vec<Bar> = first.iter().chain(&second).cloned().collect();
     let print = |bar: &Option<Bar>| {
         bar.as_ref().map_or(NONE.into(), |b| match with_interval(b.value, b.interval) {
@@ -57,13 +49,13 @@ fn row(joint: &str, diagnosis: &Diagnosis, after: Option<&TorqueGap>, evidence: 
         Some(_) => format!("{joint}: {} before, {} after, noise floor {floor_text}", print(&first), print(&second)),
         None => format!("{joint}: {}, noise floor {floor_text}", print(&first)),
     };
-    let top = top(unit, diagnosis, after, evidence);
+    let top = top(unit, gauge);
     html! {
-        div.row role="row" data-joints=(super::listed(&[joint.to_owned()])) {
+        div.row role="row" data-joints=(super::listed(std::slice::from_ref(joint))) {
             span.name role="rowheader" { (joint) }
             span.bar role="cell" { (bars::render(&bars, floor, top, &description)) }
             span.number role="cell" data-label="before" { (print(&first)) }
-            @if after.is_some() {
+            @if after {
                 span.number role="cell" data-label="after" { (print(&second)) }
                 span.number role="cell" data-label="times less" { (factor(first.as_ref(), second.as_ref())) }
             }
@@ -89,12 +81,11 @@ fn plain_two(value: f64) -> String {
 }
 
 /// Full length of the bars of all joints with this unit.
-fn top(unit: &str, diagnosis: &Diagnosis, after: Option<&TorqueGap>, evidence: &Evidence) -> f64 {
-    let same = |joint: &str| words::torque_unit(joint, evidence, &diagnosis.gap.regimes) == unit;
-    let of = |gap: &TorqueGap| {
-        let values = gap.rms.iter().chain(&gap.floor).filter(|(joint, _)| same(joint)).map(|(_, &v)| v);
-        let ends = gap.ci95.iter().filter(|(joint, _)| same(joint)).map(|(_, ends)| ends[1]);
-        bars::reach(values.chain(ends))
-    };
-    1.02 * after.map_or(0.0, of).max(of(&diagnosis.gap.torque))
+fn top(unit: &str, gauge: &Gauge) -> f64 {
+    let same = gauge.joints.iter().filter(|joint| joint.unit == unit);
+    let ends = same.flat_map(|joint| {
+        let figures = joint.before.into_iter().chain(joint.after);
+        figures.flat_map(|f| [f.value, f.ci95.map_or(f.value, |ends| ends[1])]).chain(joint.floor)
+    });
+    1.02 * bars::reach(ends)
 }

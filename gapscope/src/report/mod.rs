@@ -1,6 +1,6 @@
 //! The report: one self-contained HTML page with inline SVG, no network, the same bytes for the same input.
 //!
-//! It says everything without its scripts; they turn the robot, zoom the torque and filter by joint.
+//! It says everything without its scripts; they turn the robot, zoom the lines and filter by joint.
 
 mod answer;
 pub mod axis;
@@ -9,6 +9,7 @@ mod chart;
 mod curves;
 mod effects;
 mod format;
+mod gauge;
 mod heatmap;
 mod index;
 mod joints;
@@ -22,6 +23,7 @@ mod rollout;
 mod scene;
 pub mod score;
 mod series;
+mod servo;
 mod setting;
 mod shrink;
 mod skeleton;
@@ -34,7 +36,9 @@ pub(crate) mod sample;
 #[cfg(test)]
 mod tests;
 
+use gapscope_datasets::{Doubt, Fault};
 use gapscope_diagnosis::schema::{Diagnosis, Evidence, Verdict};
+use gauge::Gauge;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::Serialize;
 
@@ -51,10 +55,11 @@ pub use power::line as power_line;
 pub use rest::sentence as sentence_of_the_rest;
 pub use rollout::page as rollout_page;
 pub use series::picture as series_picture;
+pub use servo::{Beside, answer as servo_answer, follows as servo_follows, html as servo_html};
 pub use setting::Setting;
 pub use words::{
-    capital, effect, implied_unit, interval, joints as joint_list, motion_unit, outstanding, parameter, regime,
-    regime_phrase, rest as words_of_the_rest, said_of, verdict,
+    capital, effect, effects, implied_unit, interval, joints as joint_list, motion_unit, outstanding, parameter,
+    regime, regime_phrase, rest as words_of_the_rest, said_of, verdict,
 };
 
 /// Colours, type and layout; light and dark, wide, narrow and print.
@@ -65,34 +70,60 @@ const CHART: &str = include_str!("uplot/uPlot.iife.min.js");
 const CHART_LICENCE: &str = include_str!("uplot/LICENSE");
 /// The scripts of the report, which share one scope.
 const SCRIPTS: [&str; 3] =
-    [include_str!("script/page.js"), include_str!("script/skeleton.js"), include_str!("script/torque.js")];
+    [include_str!("script/page.js"), include_str!("script/skeleton.js"), include_str!("script/series.js")];
+/// The section of lines over time, to which the list of joints leads.
+const OVER_TIME: &str = "over-time";
 /// What the page may load: nothing.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
 /// What the scripts read.
 #[derive(Serialize)]
 struct Packet<'a> {
-    torque: Vec<series::Packet<'a>>,
+    words: Words<'a>,
+    series: Vec<series::Packet<'a>>,
     scene: Option<scene::Packet<'a>>,
+}
+
+/// What the scripts call things.
+#[derive(Serialize)]
+struct Words<'a> {
+    what: &'a str,
+    nominal: &'a str,
+    corrected: &'a str,
 }
 
 /// The report of a diagnosis as one HTML page.
 ///
 /// Figures that are not numbers print as a dash; names from the user's files are escaped.
 pub fn html(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> String {
-    let title = format!("{}, {}", diagnosis.robot, words::verdict(diagnosis.verdict));
-    let packet = Packet { torque: series::packets(evidence), scene: setting.scene.as_ref().map(scene::Scene::packet) };
+    let gauge = Gauge::of(diagnosis, evidence);
+    let top = Top {
+        read: read(diagnosis),
+        verdict: diagnosis.verdict,
+        faults: &diagnosis.data.faults,
+        doubts: &diagnosis.data.doubts,
+        said: plain::answer(diagnosis).into(),
+        day: &setting.made,
+    };
+    report(&gauge, &top, setting.scene.as_ref(), &body(&gauge, diagnosis, evidence, setting), &diagnosis.schema)
+}
+
+/// The page of any diagnosis: the answer, the robot, then the body.
+fn report(gauge: &Gauge, top: &Top, scene: Option<&scene::Scene>, body: &Markup, schema: &str) -> String {
+    let title = format!("{}, {}", gauge.robot, words::verdict(top.verdict));
+    let words = Words { what: gauge.what, nominal: gauge.nominal, corrected: gauge.corrected };
+    let packet = Packet { words, series: series::packets(gauge), scene: scene.map(scene::Scene::packet) };
     // A name that closes the script would end it: no text of JSON needs the sign as such.
     let data = serde_json::to_string(&packet).unwrap_or_default().replace('<', "\\u003c");
     let content = html! {
-        (header(diagnosis, evidence, setting))
-        main { (body(diagnosis, evidence, setting)) }
+        (header(gauge, top, scene))
+        main { (body) }
         p #filter role="status" hidden { "Showing " b {} " only " button type="button" { "Show all joints" } }
         script type="application/json" id="packet" { (PreEscaped(data)) }
         script { (PreEscaped(format!("/*\n{CHART_LICENCE}*/\n{CHART}"))) }
         script { (PreEscaped(format!("(() => {{\n{}\n}})();", SCRIPTS.join("\n")))) }
     };
-    page(&title, &content, &diagnosis.schema)
+    page(&title, &content, schema)
 }
 
 /// One self-contained page.
@@ -118,24 +149,44 @@ fn page(title: &str, content: &Markup, schema: &str) -> String {
     page.into_string()
 }
 
-fn header(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Markup {
+/// What stands on top of a report.
+struct Top<'a> {
+    read: rest::Read<'a>,
+    verdict: Verdict,
+    faults: &'a [Fault],
+    doubts: &'a [Doubt],
+    /// The answer, a line each.
+    said: Vec<String>,
+    /// The day on which it was made; may be empty.
+    day: &'a str,
+}
+
+fn read(diagnosis: &Diagnosis) -> rest::Read<'_> {
     let data = &diagnosis.data;
+    rest::Read {
+        robot: &diagnosis.robot,
+        joints: diagnosis.joints.len(),
+        episodes: data.episodes,
+        samples: data.samples,
+        duration: data.duration,
+        rate: data.rate,
+        further: vec![("torque compared below", with_unit(&plain(data.band), "Hz"))],
+        findings: &data.findings,
+    }
+}
+
+fn header(gauge: &Gauge, top: &Top, scene: Option<&scene::Scene>) -> Markup {
     html! {
         header {
             div.opening {
                 div {
-                    p.kicker {
-                        b { (diagnosis.robot) } " · " (count(diagnosis.joints.len(), "joint")) ", "
-                        (count(data.episodes, "episode")) ", "
-                        (with_unit(&plain(data.duration), "s")) " at " (with_unit(&plain(data.rate), "Hz"))
-                        @if !setting.made.is_empty() { " · " (setting.made) }
-                    }
-                    h1 class=(tone(diagnosis.verdict)) { (words::verdict(diagnosis.verdict)) }
-                    @for fault in &data.faults { p.fault role="alert" { b { "Fault of the data. " } (ticked(&crate::input::fault_line(fault))) } }
-                    @for doubt in &data.doubts { p.fault { b { "In doubt. " } (ticked(&doubt.question)) } }
-                    div.said { @for line in plain::answer(diagnosis) { p { (line) } } }
+                    p.kicker { (top.read.in_short()) @if !top.day.is_empty() { " · " (top.day) } }
+                    h1 class=(tone(top.verdict)) { (words::verdict(top.verdict)) }
+                    @for fault in top.faults { p.fault role="alert" { b { "Fault of the data. " } (ticked(&crate::input::fault_line(fault))) } }
+                    @for doubt in top.doubts { p.fault { b { "In doubt. " } (ticked(&doubt.question)) } }
+                    div.said { @for line in &top.said { p { (line) } } }
                 }
-                (skeleton::render(diagnosis, evidence, setting.scene.as_ref()))
+                (skeleton::render(gauge, scene))
             }
         }
     }
@@ -160,42 +211,60 @@ fn section(id: &str, title: &str, lead: &str, content: &Markup) -> Markup {
     }
 }
 
-fn body(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Markup {
+fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Markup {
+    let playable = setting.scene.as_ref().is_some_and(|scene| scene.plays.iter().any(|play| play.name == scene::NEXT));
     let evaluated = diagnosis.verdict != Verdict::NotExcited || !diagnosis.gap.torque.rms.is_empty();
     let robot = match evidence.robot_file.as_str() {
         "" => "ROBOT.urdf".to_owned(),
         file => reproduce::shown(file),
     };
     html! {
-        @if evaluated { (section("torque", "Torque over time", "", &series::render(diagnosis, evidence))) }
+        @if evaluated { (section(OVER_TIME, "Torque over time", "", &series::render(gauge))) }
         @if let Some(paste) = paste::render(diagnosis, setting, &robot) {
             (section("change", "What to change", "", &paste))
         }
         (section("effects", "Effects", "What the robot does that the model does not, strongest first. Of the effects reported with a confidence of 90 %, nine in ten are there.",
-            &effects::render(diagnosis)))
-        @if evaluated { (figures(diagnosis, evidence)) }
+            &effects::render(&diagnosis.effects, &diagnosis.joints, "alone, torque gap shrinks by", words::nothing_found(diagnosis.verdict))))
+        @if evaluated { (figures(gauge, diagnosis, evidence)) }
         (section("alternatives", "What else it could be", "Other sets of effects that these logs do not exclude.", &rest::alternatives(diagnosis)))
-        @if let Some(why) = why::render(diagnosis) {
+        @if let Some(why) = why::render(&diagnosis.why, &diagnosis.joints) {
             (section("why", "Why it is so", "What was proposed, against what, and by how much the logs spoke for it.", &why))
         }
-        (section("next", "The next experiment", "", &rest::next_experiment(diagnosis)))
+        (section("next", "The next experiment", "", &rest::next_experiment(diagnosis, playable)))
         @if !diagnosis.power.is_empty() {
             (section("power", "What these logs could have revealed", "The least size of each effect that would have been found. Anything smaller could be there, and nobody could tell from these logs.",
                 &power::render(diagnosis)))
         }
-        (section("data", "Data and findings", "", &rest::data(diagnosis, evidence)))
-        (section("reproduce", "How to reproduce", "", &reproduce::render(diagnosis, evidence, setting)))
+        (section("data", "Data and findings", "", &html! {
+            (rest::data(&read(diagnosis)))
+            details { summary { "The gap by joint in SI units" } (rest::figures(diagnosis, evidence)) }
+        }))
+        (section("reproduce", "How to reproduce", "", &reproduce::render(&reproduce::Made {
+            robot: &evidence.robot_file,
+            logs: &evidence.logs,
+            options: String::new(),
+            corrected: (!diagnosis.effects.is_empty()).then_some(evidence.corrected_file.as_str()),
+            what: "torque",
+            origin: setting.origin.as_ref(),
+            day: &setting.made,
+        })))
     }
 }
 
 /// The sections that rest on an evaluation: left out where the logs allowed none.
-fn figures(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
+fn figures(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
     let quiet = |joint: &str| !is_above_floor(diagnosis, joint);
     let sentences = answer::sentences(diagnosis, evidence);
+    let no_law = if diagnosis.effects.is_empty() {
+        "No effect was found, so there is no law to draw."
+    } else {
+        "No curves were kept for this report."
+    };
     html! {
-        (section("laws", "The law of each effect", "", &curves::render(diagnosis, evidence)))
+        (section("laws", "The law of each effect", "The band is the interval of the parameter, where the law is in proportion to one. Of all others the table above has the intervals.",
+            &curves::render(&curves::of(evidence, &diagnosis.effects), &diagnosis.joints, no_law)))
         (section("joints", "Torque gap by joint", "Measured torque less what the model needs for the same motion, rms on held-out data.",
-            &joints::render(diagnosis, evidence)))
+            &joints::render(gauge)))
         (section("regimes", "Where the gap lies", "Share of each regime in its joint’s squared torque gap, for the model as described, on held-out data.",
             &heatmap::render(&diagnosis.joints, &diagnosis.gap.regimes, "Gap by joint and regime", "the joint’s squared torque gap", &quiet)))
         (section("shrink", "How far it shrinks", "", &html! {

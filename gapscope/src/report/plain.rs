@@ -19,24 +19,24 @@ pub fn answer(diagnosis: &Diagnosis) -> [String; 3] {
 }
 
 fn cause(diagnosis: &Diagnosis) -> String {
+    let named = || effects(&together(diagnosis), &diagnosis.joints, &diagnosis.combinations);
     let said = match diagnosis.verdict {
         Verdict::NoGap => "Model and robot agree: these logs need no effect that the model lacks.".into(),
         Verdict::NotExcited => "The robot moves too little in these logs to tell what the model lacks.".into(),
         _ if diagnosis.effects.is_empty() => "The model lacks something, and it is no effect that I know.".into(),
-        Verdict::UnknownEffect => format!("{} Something else is at work that I do not know.", effects(diagnosis)),
-        _ => effects(diagnosis),
+        Verdict::UnknownEffect => format!("{} Something else is at work that I do not know.", named()),
+        _ => named(),
     };
     if diagnosis.data.faults.iter().any(|fault| fault.mended) { format!("Of the mended logs: {said}") } else { said }
 }
 
-/// The strongest effect in a clause, the next by name, the rest by number.
-fn effects(diagnosis: &Diagnosis) -> String {
-    let effects = together(diagnosis);
-    let [first, rest @ ..] = effects.as_slice() else { return String::new() };
+/// The strongest effect in a clause, the next by name, the rest by number; `sums` are what is known of bodies.
+pub fn effects(list: &[FoundEffect], all: &[String], sums: &[Combination]) -> String {
+    let [first, rest @ ..] = list else { return String::new() };
     let mut named: Vec<String> = rest
         .iter()
         .take(FURTHER)
-        .map(|e| match words::joints(&e.joints, &diagnosis.joints) {
+        .map(|e| match words::joints(&e.joints, all) {
             _ if e.joints.is_empty() => words::effect(&e.kind),
             place => format!("{} ({place})", words::effect(&e.kind)),
         })
@@ -45,7 +45,7 @@ fn effects(diagnosis: &Diagnosis) -> String {
         named.push(count(rest.len() - FURTHER, "weaker effect"));
     }
     let also = if named.is_empty() { String::new() } else { format!(" Beside it: {}.", words::list(&named, "and")) };
-    format!("{}.{also}", clause(first, diagnosis))
+    format!("{}.{also}", clause(first, all, sums))
 }
 
 /// The effects as they are read: links that differ are one thing, as their torques are, of which the logs tell the sums.
@@ -79,8 +79,7 @@ pub fn combination(sum: &Combination) -> String {
 }
 
 /// `joint3 rubs: 2.1 N m of dry friction that the model lacks`.
-fn clause(effect: &FoundEffect, diagnosis: &Diagnosis) -> String {
-    let all = &diagnosis.joints;
+fn clause(effect: &FoundEffect, all: &[String], sums: &[Combination]) -> String {
     let place = words::joints(&effect.joints, all);
     let (subject, several) = match effect.joints.as_slice() {
         [] => ("The robot".to_owned(), false),
@@ -107,7 +106,7 @@ fn clause(effect: &FoundEffect, diagnosis: &Diagnosis) -> String {
         "backlash" => lacking(verb("has", "have") + " play", size("gap"), "play"),
         "link_inertia_error" => {
             let links = if several { "The links of" } else { "The link of" };
-            let surest = diagnosis.combinations.iter().find(|sum| sum.differs());
+            let surest = sums.iter().find(|sum| sum.differs());
             let size = surest.map_or(String::new(), |sum| format!(": {}", combination(sum)));
             format!("{links} {place} {} not as the model has {}{size}", verb("is", "are"), verb("it", "them"))
         }
@@ -115,6 +114,16 @@ fn clause(effect: &FoundEffect, diagnosis: &Diagnosis) -> String {
         "torque_gain_error" => {
             let gain = size("gain").map_or(String::new(), |gain| format!("{gain} times "));
             format!("{subject} {} {gain}the torque that is logged", verb("delivers", "deliver"))
+        }
+        // Of servo arms.
+        "speed_limit" if size("limit").is_some() => {
+            format!("{subject} {} no faster than {}", verb("turns", "turn"), size("limit").unwrap_or_default())
+        }
+        "servo_gain_error" if size("gain").is_some() => {
+            format!("At {place} the servo pulls {} times as hard as was given", size("gain").unwrap_or_default())
+        }
+        "dead_band" if size("width").is_some() => {
+            format!("At {place} the servo rests within {} of its set point", size("width").unwrap_or_default())
         }
         kind => {
             let at = if effect.joints.is_empty() { String::new() } else { format!(" at {place}") };
@@ -215,11 +224,16 @@ fn faults(faults: &[Fault]) -> String {
 
 /// The strongest effect that the logs cannot tell from another, in words; `None` where there is none.
 pub fn tie(diagnosis: &Diagnosis) -> Option<String> {
-    let tied = diagnosis.effects.iter().find(|effect| !effect.indistinguishable_from.is_empty())?;
-    let others: Vec<String> = tied.indistinguishable_from.iter().map(|kind| words::effect(kind)).collect();
-    let name = words::effect(&tied.kind);
     let next = if diagnosis.next_experiment.is_some() { " The next experiment would." } else { "" };
-    Some(format!("These logs cannot tell {name} from {}.{next}", words::list(&others, "or")))
+    Some(first_tie(&diagnosis.effects)? + next)
+}
+
+/// The same without a word of the next experiment.
+pub fn first_tie(effects: &[FoundEffect]) -> Option<String> {
+    let tied = effects.iter().find(|effect| !effect.indistinguishable_from.is_empty())?;
+    let others = words::effects(&tied.indistinguishable_from);
+    let name = words::effect(&tied.kind);
+    Some(format!("These logs cannot tell {name} from {}.", words::list(&others, "or")))
 }
 
 #[cfg(test)]

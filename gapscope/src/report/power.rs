@@ -8,8 +8,12 @@ use maud::{Markup, html};
 /// Kinds that a line of text names.
 const TOLD: [&str; 4] = ["coulomb_friction", "viscous_friction", "torque_bias", "payload"];
 
+/// Joints that have a column each; of more the least and the greatest size stand with their joints.
+const COLUMNS: usize = 12;
+
 /// The table: effects in rows, joints in columns; what concerns the whole robot stands in a column of its own.
 pub fn render(diagnosis: &Diagnosis) -> Markup {
+    let many = diagnosis.joints.len() > COLUMNS;
     let rows = rows(&diagnosis.power);
     let whole = diagnosis.power.iter().any(|p| p.joints.is_empty());
     html! {
@@ -19,7 +23,8 @@ pub fn render(diagnosis: &Diagnosis) -> Markup {
                     tr {
                         th scope="col" { "effect" }
                         th scope="col" { "size of" }
-                        @for joint in &diagnosis.joints { th.number scope="col" { (joint) } }
+                        @if many { th.number scope="col" { "least" } th.number scope="col" { "greatest" } }
+                        @else { @for joint in &diagnosis.joints { th.number scope="col" { (joint) } } }
                         @if whole { th.number scope="col" { "whole robot" } }
                         th scope="col" { "unit" }
                     }
@@ -30,8 +35,11 @@ pub fn render(diagnosis: &Diagnosis) -> Markup {
                         tr {
                             th scope="row" { (words::capital(&words::effect(&first.kind))) }
                             td { (measure(first)) }
-                            @for joint in &diagnosis.joints {
-                                td.number { (cell(&row, |p| p.joints.last() == Some(joint))) }
+                            @if many { @for end in ends(&row) { td.number.named { (end) } } }
+                            @else {
+                                @for joint in &diagnosis.joints {
+                                    td.number { (cell(&row, |p| p.joints.last() == Some(joint))) }
+                                }
                             }
                             @if whole { td.number { (cell(&row, |p| p.joints.is_empty())) } }
                             td.nowrap { (with_unit("", &first.unit).trim()) }
@@ -81,6 +89,14 @@ fn rows(power: &[Power]) -> Vec<Vec<&Power>> {
     rows
 }
 
+/// The least and the greatest size of a row, each with its joint.
+fn ends(row: &[&Power]) -> [String; 2] {
+    let sizes = || row.iter().filter_map(|p| Some((p.size?, p.joints.last()?)));
+    let by_size = |a: &(f64, &String), b: &(f64, &String)| a.0.total_cmp(&b.0);
+    [sizes().min_by(by_size), sizes().max_by(by_size)]
+        .map(|end| end.map_or(NONE.into(), |(size, joint)| format!("{} at {joint}", significant(size, 2))))
+}
+
 fn cell(row: &[&Power], here: impl Fn(&Power) -> bool) -> String {
     let size = row.iter().find(|p| here(p)).and_then(|p| p.size);
     size.map_or(NONE.into(), |size| significant(size, 2))
@@ -94,5 +110,31 @@ fn measure(power: &Power) -> String {
         ("torque_gain_error", "gain") => format!("{name}, off one by"),
         ("stribeck_friction", "static") => format!("{name}, above Coulomb"),
         _ => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn of_many_joints_the_ends_stand_with_their_names() {
+        let (_, mut diagnosis, _) = sample::explained();
+        assert!(!render(&diagnosis).into_string().contains("greatest"));
+        diagnosis.joints = (0..=COLUMNS).map(|j| format!("joint{j}")).collect();
+        let one = |joint: usize, size: f64| Power {
+            kind: "coulomb_friction".into(),
+            joints: vec![format!("joint{joint}")],
+            parameter: "coulomb".into(),
+            size: Some(size),
+            unit: "N m".into(),
+        };
+        diagnosis.power = vec![one(0, 0.2), one(3, 0.01), one(5, 0.7)];
+        let table = render(&diagnosis).into_string();
+        assert!(
+            table.contains("0.010 at joint3") && table.contains("0.70 at joint5") && !table.contains("joint12"),
+            "{table}"
+        );
     }
 }

@@ -1,7 +1,6 @@
 //! How to check it all: who made this of what and when, and the commands that make it again.
 
-use super::setting::Setting;
-use gapscope_diagnosis::schema::{Diagnosis, Evidence};
+use gapscope_diagnosis::Origin;
 use maud::{Markup, html};
 use std::path::Path;
 
@@ -10,33 +9,50 @@ const DIGITS: usize = 16;
 /// Logs that are listed at once; the rest folds away.
 const LISTED: usize = 8;
 
+/// What a diagnosis was made of, and what it wrote.
+pub struct Made<'a> {
+    /// Robot description and logs as given on the command line; may be empty.
+    pub robot: &'a str,
+    pub logs: &'a [String],
+    /// Further options of the call, ready for a shell; empty for none.
+    pub options: String,
+    /// The corrected model that was written; `None` where the model needs no correction.
+    pub corrected: Option<&'a str>,
+    /// The quantity whose samples can be written.
+    pub what: &'static str,
+    /// Digests of model and logs.
+    pub origin: Option<&'a Origin>,
+    /// The day, UTC; may be empty.
+    pub day: &'a str,
+}
+
 /// Version, day, digests, commands.
-pub fn render(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Markup {
+pub fn render(made: &Made) -> Markup {
     let or = |text: &str, otherwise: &str| {
         if text.is_empty() { otherwise.to_string() } else { quote(&shown(text)) }
     };
-    let robot = or(&evidence.robot_file, "ROBOT.urdf");
-    let corrected = or(&evidence.corrected_file, "corrected.json");
-    let logs: Vec<String> = evidence.logs.iter().map(|log| quote(&shown(log))).collect();
+    let robot = or(made.robot, "ROBOT.urdf");
+    let logs: Vec<String> = made.logs.iter().map(|log| quote(&shown(log))).collect();
     let logs = if logs.is_empty() { "LOG...".into() } else { logs.join(" ") };
-    let with = if diagnosis.effects.is_empty() { String::new() } else { format!(" --with {corrected}") };
+    let with = made.corrected.map_or_else(String::new, |file| format!(" --with {}", or(file, "corrected.json")));
+    let options = &made.options;
     let commands = [
         (
-            "The same figures on logs that this diagnosis has not seen",
-            format!("gapscope evaluate {robot} OTHER_LOG...{with}"),
+            "The same figures on logs that this diagnosis has not seen".to_owned(),
+            format!("gapscope evaluate {robot} OTHER_LOG...{options}{with}"),
         ),
         (
-            "Measured, nominal and corrected torque of every sample, to check the figures by other means",
-            format!("gapscope evaluate {robot} {logs}{with} --predictions predictions.csv"),
+            format!("Measured and modelled {} of every sample, to check the figures by other means", made.what),
+            format!("gapscope evaluate {robot} {logs}{options}{with} --predictions predictions.csv"),
         ),
-        ("This report and diagnosis.json again", format!("gapscope diagnose {robot} {logs}")),
+        ("This report and diagnosis.json again".to_owned(), format!("gapscope diagnose {robot} {logs}{options}")),
     ];
     html! {
         dl.facts {
             div { dt { "program" } dd { "gapscope " (env!("CARGO_PKG_VERSION")) } }
-            @if !setting.made.is_empty() { div { dt { "made on" } dd { (setting.made) } } }
+            @if !made.day.is_empty() { div { dt { "made on" } dd { (made.day) } } }
         }
-        (digests(evidence, setting))
+        (digests(made))
         @for (i, (what, command)) in commands.iter().enumerate() {
             p { (what) ":" }
             @let id = format!("command-{i}");
@@ -49,10 +65,10 @@ pub fn render(diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> 
     }
 }
 
-fn digests(evidence: &Evidence, setting: &Setting) -> Markup {
-    let Some(origin) = &setting.origin else { return html! {} };
-    let robot = (shown(&evidence.robot_file), origin.robot.as_str());
-    let logs = evidence.logs.iter().zip(&origin.logs).map(|(log, digest)| (shown(log), digest.as_str()));
+fn digests(made: &Made) -> Markup {
+    let Some(origin) = made.origin else { return html! {} };
+    let robot = (shown(made.robot), origin.robot.as_str());
+    let logs = made.logs.iter().zip(&origin.logs).map(|(log, digest)| (shown(log), digest.as_str()));
     let rows: Vec<(String, &str)> = std::iter::once(robot).chain(logs).collect();
     let list = |rows: &[(String, &str)]| {
         html! {
@@ -81,7 +97,7 @@ pub fn shown(path: &str) -> String {
 }
 
 /// A word as a shell takes it.
-fn quote(text: &str) -> String {
+pub fn quote(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@".contains(c);
     if text.chars().all(plain) { text.into() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }

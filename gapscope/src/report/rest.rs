@@ -67,8 +67,8 @@ pub fn alternatives(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-/// The motion that would tell more.
-pub fn next_experiment(diagnosis: &Diagnosis) -> Markup {
+/// The motion that would tell more; `playable` where the robot on the page can play it.
+pub fn next_experiment(diagnosis: &Diagnosis, playable: bool) -> Markup {
     let Some(next) = &diagnosis.next_experiment else {
         let text = match diagnosis.verdict {
             Verdict::NoGap | Verdict::Explained => "None needed: these logs leave nothing to separate.",
@@ -84,38 +84,63 @@ pub fn next_experiment(diagnosis: &Diagnosis) -> Markup {
             @if let Some(file) = &next.trajectory {
                 p { code { (file) } " beside this report holds time, position, velocity and acceleration of every joint, from rest to rest, within the URDF’s limits. Diagnose its log together with these." }
             }
+            @if playable {
+                p.tools.needs-script { button type="button" data-play=(super::scene::NEXT) { "Play it on the robot above" } }
+            }
             @if !kinds.is_empty() { p.muted { "Tells apart: " (words::list(&kinds, "and")) "." } }
         }
     }
 }
 
+/// What was read.
+pub struct Read<'a> {
+    /// Name of the robot.
+    pub robot: &'a str,
+    /// Number of joints, episodes and samples.
+    pub joints: usize,
+    pub episodes: usize,
+    pub samples: usize,
+    /// Length of all, s, and rate, Hz.
+    pub duration: f64,
+    pub rate: f64,
+    /// Further facts: a word and what it is.
+    pub further: Vec<(&'static str, String)>,
+    /// What was odd.
+    pub findings: &'a [String],
+}
+
+impl Read<'_> {
+    /// The same in the fewest words.
+    pub fn in_short(&self) -> Markup {
+        html! {
+            b { (self.robot) } " · " (count(self.joints, "joint")) ", " (count(self.episodes, "episode")) ", "
+            (with_unit(&plain(self.duration), "s")) " at " (with_unit(&plain(self.rate), "Hz"))
+        }
+    }
+}
+
 /// What was read, and what was odd in it.
-pub fn data(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
-    let data = &diagnosis.data;
+pub fn data(read: &Read) -> Markup {
     html! {
         dl.facts {
-            div { dt { "robot" } dd { (diagnosis.robot) ", " (count(diagnosis.joints.len(), "joint")) } }
-            div { dt { "episodes" } dd { (group(data.episodes)) } }
-            div { dt { "samples" } dd { (group(data.samples)) } }
-            div { dt { "length" } dd { (with_unit(&plain(data.duration), "s")) } }
-            div { dt { "rate" } dd { (with_unit(&plain(data.rate), "Hz")) } }
-            div { dt { "torque compared below" } dd { (with_unit(&plain(data.band), "Hz")) } }
+            div { dt { "robot" } dd { (read.robot) ", " (count(read.joints, "joint")) } }
+            div { dt { "episodes" } dd { (group(read.episodes)) } }
+            div { dt { "samples" } dd { (group(read.samples)) } }
+            div { dt { "length" } dd { (with_unit(&plain(read.duration), "s")) } }
+            div { dt { "rate" } dd { (with_unit(&plain(read.rate), "Hz")) } }
+            @for (what, value) in &read.further { div { dt { (what) } dd { (value) } } }
         }
         h3 { "Findings" }
-        @if data.findings.is_empty() {
+        @if read.findings.is_empty() {
             p { "None: nothing odd in the robot description or the logs." }
         } @else {
-            ul.findings { @for finding in &data.findings { li { (super::ticked(finding)) } } }
-        }
-        details {
-            summary { "The gap by joint in SI units" }
-            (figures(diagnosis, evidence))
+            ul.findings { @for finding in read.findings { li { (super::ticked(finding)) } } }
         }
     }
 }
 
 /// Gap of every joint in its own units, before and, where known, after.
-fn figures(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
+pub fn figures(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
     let gap = &diagnosis.gap;
     let after = evidence.remaining.as_ref();
     html! {

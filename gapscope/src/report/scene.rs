@@ -1,21 +1,20 @@
-//! The robot as a skeleton in space: where its joints lie in the logs, and where open-loop rollouts of the models take them.
+//! The robot as a skeleton in space: where its joints lie in the logs, and where models or a motion to come take them.
 //!
 //! Forward kinematics stands here alone: the page gets points, and its script only turns and draws them.
 
+mod plays;
+
+pub use plays::NEXT;
+
 use super::packed::Packed;
 use gapscope_datasets::Episode;
-use gapscope_diagnosis::Corrected;
-use gapscope_dynamics::{Data, Model, StepModel};
-use gapscope_effects::Plant;
+use gapscope_dynamics::{Data, Model};
 use glam::DVec3;
 use serde::Serialize;
 
 /// Instants of the logs that are kept over all joints, and the most of them.
 const POINTS: usize = 4000;
 const FRAMES: usize = 240;
-/// Frames and length of a rollout that plays, s.
-const STEPS: usize = 40;
-const HORIZON: f64 = 1.0;
 /// Half the length of a joint's barrel, as a part of the robot's reach.
 const BARREL: f64 = 0.045;
 /// A link without joints behind it ends at this many times its centre of mass: at two a rod is as long as it is.
@@ -38,15 +37,28 @@ pub struct Scene {
     pub time: Vec<f64>,
     /// `[frame][point]`: both ends of each joint's barrel, then the tips.
     pub frames: Vec<Vec<DVec3>>,
-    /// Rollouts from one instant: the robot, the model as described, the model with the effects where there are any.
-    pub rollouts: Vec<Rollout>,
-    /// Length of the rollouts, s.
-    pub horizon: f64,
+    /// What plays beside the log.
+    pub plays: Vec<Play>,
+}
+
+/// Skeletons that move together from one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Play {
+    /// By which the page's buttons name it.
+    pub name: &'static str,
+    /// Words of its button.
+    pub label: &'static str,
+    /// Length, s.
+    pub length: f64,
+    /// Seconds of it in a second of the reader's.
+    pub pace: f64,
+    /// The robot first, then the models. Frames are evenly spaced; a model that leaves the finite numbers has fewer.
+    pub skeletons: Vec<Moving>,
 }
 
 /// One skeleton that plays.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rollout {
+pub struct Moving {
     /// `measured`, `before` or `after`: classes of the style sheet.
     pub class: &'static str,
     /// As in [`Scene::frames`].
@@ -64,19 +76,22 @@ pub struct Packet<'a> {
     time: Packed,
     /// One row for each coordinate of each point.
     points: Vec<Packed>,
-    horizon: f64,
-    rollouts: Vec<(&'static str, Vec<Packed>)>,
+    plays: Vec<PlayPacket>,
+}
+
+#[derive(Serialize)]
+struct PlayPacket {
+    name: &'static str,
+    length: f64,
+    pace: f64,
+    skeletons: Vec<(&'static str, Vec<Packed>)>,
 }
 
 impl Scene {
-    /// The skeleton in the logs, and rollouts of the model as described and with the corrections.
-    pub fn new(model: &Model, episodes: &[Episode], corrected: &Corrected) -> Scene {
-        let n = model.dof();
-        let parents: Vec<Option<usize>> = model.joints().iter().map(|joint| joint.parent).collect();
-        let leaves = (0..n).filter(|&j| !parents.contains(&Some(j)));
-        let mut skeleton = Skeleton { model, tips: leaves.collect(), reach: 1.0 };
-        skeleton.measure();
-        let most = (POINTS / (2 * n + 1).max(1)).clamp(20, FRAMES);
+    /// The skeleton in the logs; nothing else plays yet.
+    pub fn new(model: &Model, episodes: &[Episode]) -> Scene {
+        let skeleton = Skeleton::of(model);
+        let most = most_frames(model);
         let total: f64 = episodes.iter().map(|e| e.len() as f64 * e.dt()).sum();
         let every = total / most as f64;
         let (mut time, mut frames, mut offset, mut next) = (vec![], vec![], 0.0, 0.0);
@@ -91,9 +106,9 @@ impl Scene {
             }
             offset += episode.len() as f64 * episode.dt();
         }
-        let (rollouts, horizon) = rollouts(&skeleton, episodes, corrected).unwrap_or_default();
+        let parents = model.joints().iter().map(|joint| joint.parent).collect();
         let joints = model.joints().iter().map(|joint| joint.name.clone()).collect();
-        Scene { joints, parents, tips: skeleton.tips, time, frames, rollouts, horizon }
+        Scene { joints, parents, tips: skeleton.tips, time, frames, plays: Vec::new() }
     }
 
     /// The frame that shows the robot at its widest: folded up, its joints hide each other.
@@ -116,10 +131,31 @@ impl Scene {
             still: self.still(),
             time: Packed::new(&self.time, 1e-3),
             points: rows(&self.frames),
-            horizon: self.horizon,
-            rollouts: self.rollouts.iter().map(|r| (r.class, rows(&r.frames))).collect(),
+            plays: self.plays.iter().map(Play::packet).collect(),
         }
     }
+
+    /// Every frame in which the robot stands somewhere; what only a model does may leave the picture.
+    pub fn robot_frames(&self) -> impl Iterator<Item = &Vec<DVec3>> {
+        let played = self.plays.iter().filter_map(|play| play.skeletons.first());
+        self.frames.iter().chain(played.flat_map(|robot| &robot.frames))
+    }
+}
+
+impl Play {
+    fn packet(&self) -> PlayPacket {
+        PlayPacket {
+            name: self.name,
+            length: self.length,
+            pace: self.pace,
+            skeletons: self.skeletons.iter().map(|s| (s.class, rows(&s.frames))).collect(),
+        }
+    }
+}
+
+/// Frames of a motion that keep the page small whatever the robot.
+fn most_frames(model: &Model) -> usize {
+    (POINTS / (2 * model.dof() + 1)).clamp(20, FRAMES)
 }
 
 fn rows(frames: &[Vec<DVec3>]) -> Vec<Packed> {
@@ -138,7 +174,15 @@ struct Skeleton<'a> {
     reach: f64,
 }
 
-impl Skeleton<'_> {
+impl<'a> Skeleton<'a> {
+    fn of(model: &'a Model) -> Skeleton<'a> {
+        let carries = |j: &usize| model.joints().iter().any(|joint| joint.parent == Some(*j));
+        let tips = (0..model.dof()).filter(|j| !carries(j)).collect();
+        let mut skeleton = Skeleton { model, tips, reach: 1.0 };
+        skeleton.measure();
+        skeleton
+    }
+
     /// Finds the reach: the sum of all lengths from the base to the farthest point, at position zero.
     fn measure(&mut self) {
         let joints = self.model.joints();
@@ -179,44 +223,4 @@ impl Skeleton<'_> {
         let tips = self.tips.iter().map(|&j| data.world_from_link(j).transform_point(self.tip(j)));
         ends.chain(tips).map(|point| point / self.reach).collect()
     }
-}
-
-/// Skeletons of the robot and the models from one instant of the longest log; `None` where nothing can be rolled out.
-fn rollouts(skeleton: &Skeleton, episodes: &[Episode], corrected: &Corrected) -> Option<(Vec<Rollout>, f64)> {
-    let whole = |e: &&Episode| e.has_effort() && e.effort_unknown.is_empty() && e.len() > 2 * STEPS;
-    let episode = episodes.iter().filter(whole).max_by_key(|e| e.len())?;
-    let (model, dt) = (skeleton.model, episode.dt());
-    let start = episode.len() / 4;
-    let stride = ((HORIZON / dt) as usize).min(episode.len() - start - 2) / STEPS;
-    if stride == 0 {
-        return None;
-    }
-    let [q, before, after] = [start, start - 1, start + 1].map(|k| sample(&episode.position, k));
-    let v: Vec<f64> = match &episode.velocity {
-        Some(velocity) => sample(velocity, start),
-        None => before.iter().zip(&after).map(|(a, b)| (b - a) / (2.0 * dt)).collect(),
-    };
-    let run = |mut plant: Plant| {
-        let mut x = vec![0.0; plant.state_len()];
-        plant.start_at(start as f64 * dt, &q, &v, &mut x);
-        let mut frames = vec![skeleton.at(&q)];
-        for step in 0..STEPS {
-            for k in 0..stride {
-                plant.step(&mut x, &sample(&episode.effort, start + step * stride + k));
-            }
-            let place = &x[..model.dof()];
-            if place.iter().any(|q| !q.is_finite()) {
-                break;
-            }
-            frames.push(skeleton.at(place));
-        }
-        frames
-    };
-    let log = (0..=STEPS).map(|s| skeleton.at(&sample(&episode.position, start + s * stride))).collect();
-    let mut list = vec![Rollout { class: "measured", frames: log }];
-    list.push(Rollout { class: "before", frames: run(Plant::nominal(model, dt)) });
-    if !corrected.effects.is_empty() {
-        list.push(Rollout { class: "after", frames: run(corrected.plant(model, dt).ok()?) });
-    }
-    Some((list, (STEPS * stride) as f64 * dt))
 }

@@ -1,12 +1,13 @@
-//! Measured against modelled torque over time, one small multiple for each joint.
+//! Measured against modelled torque or position over time, one small multiple for each joint.
 
-use super::answer;
 use super::axis::Axis;
 use super::chart::{Plot, band, envelope, line};
 use super::format::{count, figure, with_unit};
+use super::gauge::{Gauge, JointGap, Series};
 use super::packed::{self, Packed};
-use crate::picture::{Panel, Series, panels};
-use gapscope_diagnosis::schema::{Diagnosis, Evidence, TorqueSeries};
+use super::words;
+use crate::picture::{Panel, Series as Line, panels};
+use gapscope_diagnosis::schema::Evidence;
 use maud::{Markup, html};
 use serde::Serialize;
 
@@ -27,13 +28,13 @@ const THIN: usize = 240;
 /// Torque of every joint and beside it what the models leave, over the stretch in the middle of the logs, as a picture of
 /// its own; `None` where the evidence holds no torque.
 pub fn picture(title: &str, evidence: &Evidence) -> Option<String> {
-    let drawn: Vec<&TorqueSeries> = evidence.torque.iter().filter(|s| s.time.len() > 1).collect();
-    let panels_of: Vec<Panel> = drawn.iter().flat_map(|series| stretch(series)).collect();
+    let drawn = evidence.torque.iter().filter(|s| s.time.len() > 1);
+    let panels_of: Vec<Panel> = drawn.flat_map(|series| stretch(&Series::from(series))).collect();
     (!panels_of.is_empty()).then(|| panels(title, &panels_of))
 }
 
-fn stretch(series: &TorqueSeries) -> [Panel; 2] {
-    let unit = if series.unit.is_empty() { "N m" } else { &series.unit };
+fn stretch(series: &Series) -> [Panel; 2] {
+    let unit = &series.unit;
     let [first, last] = [series.time.first(), series.time.last()].map(|t| t.copied().unwrap_or(0.0));
     let middle = 0.5 * (first + last);
     let inside = |t: &f64| (t - middle).abs() <= 0.5 * WINDOW;
@@ -41,7 +42,7 @@ fn stretch(series: &TorqueSeries) -> [Panel; 2] {
     let of = |name: &str, value: &dyn Fn(usize) -> f64| {
         let values: Vec<f64> = kept.iter().map(|&i| value(i)).collect();
         let points = envelope(&values, &[], THIN).into_iter().map(|k| [series.time[kept[k]], values[k]]).collect();
-        Series { name: name.into(), points, ..Series::default() }
+        Line { name: name.into(), points, ..Line::default() }
     };
     let nominal = |i: usize| series.nominal.get(i).copied().unwrap_or(f64::NAN);
     let (effects, described) = ("model with the effects", "model as described");
@@ -73,14 +74,13 @@ pub struct Packet<'a> {
     breaks: Vec<usize>,
 }
 
-/// Every joint's torque for the script, thinned so that the peaks of each line stay.
-pub fn packets(evidence: &Evidence) -> Vec<Packet<'_>> {
-    let drawn: Vec<&TorqueSeries> = evidence.torque.iter().filter(|s| !s.time.is_empty()).collect();
-    let stretches = (STRETCHES_ALL / drawn.len().max(1)).clamp(60, STRETCHES_ONE);
-    drawn.into_iter().map(|series| packet(series, stretches)).collect()
+/// Every joint's lines for the script, thinned so that the peaks of each stay.
+pub fn packets(gauge: &Gauge) -> Vec<Packet<'_>> {
+    let stretches = (STRETCHES_ALL / gauge.series.len().max(1)).clamp(60, STRETCHES_ONE);
+    gauge.series.iter().map(|series| packet(series, stretches)).collect()
 }
 
-fn packet(series: &TorqueSeries, stretches: usize) -> Packet<'_> {
+fn packet(series: &Series, stretches: usize) -> Packet<'_> {
     let lines = [&series.measured, &series.nominal, &series.corrected];
     let mut kept: Vec<usize> = lines
         .iter()
@@ -95,7 +95,7 @@ fn packet(series: &TorqueSeries, stretches: usize) -> Packet<'_> {
     };
     Packet {
         joint: &series.joint,
-        unit: if series.unit.is_empty() { "N m" } else { &series.unit },
+        unit: &series.unit,
         step,
         t: of(&series.time, 1e-3),
         m: of(&series.measured, step),
@@ -106,25 +106,26 @@ fn packet(series: &TorqueSeries, stretches: usize) -> Packet<'_> {
 }
 
 /// The joint with the largest gap in full, then all of them small; a sentence where the evidence holds none.
-pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
-    let drawn: Vec<&TorqueSeries> = evidence.torque.iter().filter(|s| !s.time.is_empty()).collect();
+pub fn render(gauge: &Gauge) -> Markup {
+    let drawn = &gauge.series;
     let Some(first) = drawn.first() else {
-        return html! { p.muted { "No torque over time was kept for this report." } };
+        return html! { p.muted { "No " (gauge.what) " over time was kept for this report." } };
     };
     let stretches = (POINTS / (10 * drawn.len())).clamp(60, STRETCHES);
     let corrected = drawn.iter().any(|s| !s.corrected.is_empty());
-    let worst = answer::largest(diagnosis).map_or(first.joint.as_str(), |(joint, _)| joint);
+    let worst = gauge.largest().map_or(first.joint.as_str(), |joint| &joint.name);
     let shown = drawn.iter().find(|s| s.joint == worst).unwrap_or(first);
+    let one = |series: &Series| joint(series, gauge.joint(&series.joint), gauge.what, stretches);
     html! {
         p.legend {
             span.swatch.measured {} " measured"
-            span.swatch.before {} " model as described"
-            @if corrected { span.swatch.after {} " model with the effects" }
-            span.swatch.gap {} " gap between measured and model as described"
+            span.swatch.before {} " " (gauge.nominal)
+            @if corrected { span.swatch.after {} " " (gauge.corrected) }
+            span.swatch.gap {} " gap between measured and " (gauge.nominal)
         }
         div #live hidden {
             div.tools {
-                label { "joint " select { @for s in &drawn { option value=(s.joint) selected[s.joint == shown.joint] { (s.joint) } } } }
+                label { "joint " select { @for s in drawn { option value=(s.joint) selected[s.joint == shown.joint] { (s.joint) } } } }
                 span role="group" aria-label="Zoom" {
                     @for (act, label, sign) in [("in", "zoom in", "+"), ("out", "zoom out", "−"), ("left", "earlier", "←"), ("right", "later", "→"), ("all", "show all", "all")] {
                         button type="button" data-zoom=(act) aria-label=(label) title=(label) { (sign) }
@@ -132,17 +133,19 @@ pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
                 }
             }
             div.chart tabindex="0" role="application"
-                aria-label="Torque over time of the joint chosen. Arrow keys read it, plus and minus zoom, shift with arrows moves, 0 shows all." {}
+                aria-label={ (words::capital(gauge.what)) " over time of the joint chosen. Arrow keys read it, plus and minus zoom, shift with arrows moves, 0 shows all." } {}
             output aria-live="polite" {}
             p.note { "Below: measured less each model. Drag over a stretch to zoom, double-click to see all. Episodes one after another, fits on held-out data, thinned so that peaks stay." }
         }
-        div data-still="" { (joint(shown, &rms(&shown.joint, diagnosis, evidence), stretches)) }
+        div data-still="" { (one(shown)) }
         details.all-joints open[drawn.len() <= OPEN] {
-            summary { "All " (count(drawn.len(), "joint")) ", with the error that is left" }
+            summary {
+                @if drawn.len() > 1 { "All " (count(drawn.len(), "joint")) ", with the error that is left" } @else { "With the error that is left" }
+            }
             div.grid-two {
                 @for series in drawn {
                     div data-joints=(super::listed(std::slice::from_ref(&series.joint))) {
-                        (joint(series, &rms(&series.joint, diagnosis, evidence), stretches))
+                        (one(series))
                     }
                 }
             }
@@ -150,15 +153,8 @@ pub fn render(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
     }
 }
 
-/// Rms of the gap before and, where known, after, as held-out data gave it; so that it agrees with the other sections.
-fn rms(joint: &str, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<f64> {
-    let before = diagnosis.gap.torque.rms.get(joint);
-    let after = evidence.remaining.as_ref().and_then(|gap| gap.torque.rms.get(joint));
-    before.into_iter().chain(after).copied().collect()
-}
-
 /// The area between measured and model as described.
-fn shade(series: &TorqueSeries, stretches: usize, x: &Axis, y: &Axis) -> Markup {
+fn shade(series: &Series, stretches: usize, x: &Axis, y: &Axis) -> Markup {
     let gap: Vec<f64> = series.measured.iter().zip(&series.nominal).map(|(a, b)| a - b).collect();
     if gap.len() != series.time.len() {
         return html! {};
@@ -168,14 +164,14 @@ fn shade(series: &TorqueSeries, stretches: usize, x: &Axis, y: &Axis) -> Markup 
     band(&points, x, y, "gap")
 }
 
-fn joint(series: &TorqueSeries, rms: &[f64], stretches: usize) -> Markup {
-    let unit = if series.unit.is_empty() { "N m" } else { &series.unit };
+fn joint(series: &Series, gap: Option<&JointGap>, what: &str, stretches: usize) -> Markup {
+    let unit = &series.unit;
     let n = series.time.len();
     let error = |model: &[f64]| -> Vec<f64> { series.measured.iter().zip(model).map(|(a, b)| a - b).collect() };
     let (before, after) = (error(&series.nominal), error(&series.corrected));
     let x = Axis::tight(series.time.iter().copied(), "time, s", 6);
-    let torques = series.measured.iter().chain(&series.nominal).chain(&series.corrected).copied();
-    let y = Axis::padded(torques, &format!("torque, {unit}"), 4);
+    let values = series.measured.iter().chain(&series.nominal).chain(&series.corrected).copied();
+    let y = Axis::padded(values, &format!("{what}, {unit}"), 4);
     let errors = Axis::padded(before.iter().chain(&after).copied().chain([0.0]), &format!("error, {unit}"), 3);
     let draw = |values: &[f64], y: &Axis, class: &str| {
         if values.is_empty() {
@@ -195,16 +191,19 @@ fn joint(series: &TorqueSeries, rms: &[f64], stretches: usize) -> Markup {
             })
             .collect()
     };
-    let figures = match rms {
-        [] => "measured and modelled".to_string(),
-        [before] => format!("gap {} rms", with_unit(&figure(*before), unit)),
-        [before, after, ..] => format!("gap {} → {} rms", figure(*before), with_unit(&figure(*after), unit)),
+    // As held-out data gave it, so that it agrees with the other sections.
+    let figures = match gap.and_then(|gap| Some((gap.before?.value, gap.after.map(|after| after.value), &gap.unit))) {
+        None => "measured and modelled".to_string(),
+        Some((before, None, unit)) => format!("gap {} rms", with_unit(&figure(before), unit)),
+        Some((before, Some(after), unit)) => {
+            format!("gap {} → {} rms", figure(before), with_unit(&figure(after), unit))
+        }
     };
     html! {
         figure {
             figcaption { b { (series.joint) } span { (figures) } }
             (Plot {
-                description: format!("{}: measured and modelled torque over time; {figures}", series.joint),
+                description: format!("{}: measured and modelled {what} over time; {figures}", series.joint),
                 marks: html! {
                     (shade(series, stretches, &x, &y))
                     (draw(&series.measured, &y, "measured"))
@@ -214,7 +213,7 @@ fn joint(series: &TorqueSeries, rms: &[f64], stretches: usize) -> Markup {
                 x: x.clone(), y: y.clone(), class: "tall", rules: rules(true), x_labels: false,
             }.render())
             (Plot {
-                description: format!("{}: torque error over time before and after; {figures}", series.joint),
+                description: format!("{}: {what} error over time before and after; {figures}", series.joint),
                 marks: html! { (draw(&before, &errors, "before")) (draw(&after, &errors, "after")) },
                 x: x.clone(), y: errors.clone(), class: "low", rules: rules(false), x_labels: true,
             }.render())

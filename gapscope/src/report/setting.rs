@@ -2,7 +2,7 @@
 
 use super::scene::Scene;
 use crate::robot::Description;
-use gapscope_datasets::Episode;
+use gapscope_datasets::{Episode, Trajectory};
 use gapscope_diagnosis::{Corrected, Origin};
 use gapscope_dynamics::{Loaded, Model};
 use gapscope_export::{Robot, Target, TargetLedger, export};
@@ -22,11 +22,13 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// The setting of a diagnosis that was just made. `loaded` is the robot as it was given, joints held as in `model`.
+    /// The setting of a diagnosis that was just made. `next` is the motion that it proposes, `loaded` the robot as it was
+    /// given, joints held as in `model`.
     pub fn new(
         model: &Model,
         episodes: &[Episode],
         corrected: &Corrected,
+        next: Option<&Trajectory>,
         description: &Description,
         loaded: Option<&Loaded>,
     ) -> Setting {
@@ -36,17 +38,16 @@ impl Setting {
             // A robot that has no URDF has nothing to paste into it.
             Some(export(Target::Urdf, &robot, corrected, &[]).ok()?.ledger)
         });
-        Setting {
-            scene: Some(Scene::new(model, episodes, corrected)),
-            ledger,
-            origin: corrected.made_from.clone(),
-            made: today(),
+        let mut scene = Scene::new(model, episodes).with_rollouts(model, episodes, corrected);
+        if let Some(trajectory) = next {
+            scene = scene.with_motion(model, trajectory);
         }
+        Setting { scene: Some(scene), ledger, origin: corrected.made_from.clone(), made: today() }
     }
 }
 
 /// Today, UTC; or the day of `SOURCE_DATE_EPOCH`, which makes a report the same to the byte on any day.
-fn today() -> String {
+pub fn today() -> String {
     let given = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
     let now = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO).as_secs() as i64;
     chrono::DateTime::from_timestamp(given.unwrap_or_else(now), 0)

@@ -1,9 +1,9 @@
 //! The robot's skeleton as a picture, and the list of its joints: each leads to what the page says of that joint.
 
+use super::chart::short;
 use super::format::{significant, with_unit};
+use super::gauge::Gauge;
 use super::scene::Scene;
-use super::{answer, chart::short, words};
-use gapscope_diagnosis::schema::{Diagnosis, Evidence};
 use glam::DVec3;
 use maud::{Markup, html};
 
@@ -12,15 +12,6 @@ const VIEW: [f64; 2] = [-0.6, 0.3];
 /// Corners of the circle that stands for the floor, and its radius as a part of the picture.
 const FLOOR: usize = 48;
 const FLOOR_RADIUS: f64 = 0.35;
-
-/// How boldly a joint is drawn: its gap as a part of the largest with the same unit; `None` at the noise floor.
-pub fn boldness(diagnosis: &Diagnosis, evidence: &Evidence, joint: &str) -> Option<f64> {
-    let unit = |joint: &str| words::torque_unit(joint, evidence, &diagnosis.gap.regimes);
-    let own = *diagnosis.gap.torque.rms.get(joint).filter(|rms| rms.is_finite())?;
-    let same = diagnosis.gap.torque.rms.iter().filter(|(other, _)| unit(other) == unit(joint));
-    let most = same.map(|(_, rms)| *rms).filter(|rms| rms.is_finite()).fold(0.0, f64::max);
-    (answer::is_above_floor(diagnosis, joint) && most > 0.0).then_some(own / most)
-}
 
 /// Class and style that colour a joint.
 fn tone(bold: Option<f64>) -> (&'static str, String) {
@@ -31,18 +22,18 @@ fn tone(bold: Option<f64>) -> (&'static str, String) {
 }
 
 /// Picture, its controls and the list; without a scene the list alone.
-pub fn render(diagnosis: &Diagnosis, evidence: &Evidence, scene: Option<&Scene>) -> Markup {
+pub fn render(gauge: &Gauge, scene: Option<&Scene>) -> Markup {
     html! {
         div.robot {
             @if let Some((scene, still)) = scene.and_then(|s| Some((s, s.frames.get(s.still())?))) {
-                (picture(diagnosis, evidence, scene, still))
+                (picture(gauge, scene, still))
             }
-            (chips(diagnosis, evidence))
+            (chips(gauge))
         }
     }
 }
 
-fn picture(diagnosis: &Diagnosis, evidence: &Evidence, scene: &Scene, still: &[DVec3]) -> Markup {
+fn picture(gauge: &Gauge, scene: &Scene, still: &[DVec3]) -> Markup {
     let view = View::of(scene);
     let point = |p: DVec3| view.project(p);
     let middle = |j: usize| 0.5 * (still[2 * j] + still[2 * j + 1]);
@@ -59,9 +50,9 @@ fn picture(diagnosis: &Diagnosis, evidence: &Evidence, scene: &Scene, still: &[D
         html! { line.link x1=(short3(x1)) y1=(short3(y1)) x2=(short3(x2)) y2=(short3(y2)) {} }
     };
     html! {
-        figure.skeleton {
+        figure.skeleton.many[n > LABELLED] {
             svg #skeleton viewBox="-1 -1 2 2" role="group" tabindex="0"
-                aria-label={ "Skeleton of " (diagnosis.robot) ", joints coloured by torque gap. Arrow keys turn it." } {
+                aria-label={ "Skeleton of " (gauge.robot) ", joints coloured by " (gauge.what) " gap. Arrow keys turn it." } {
                 polyline.floor points=(floor.join(" ")) {}
                 g.links {
                     @for j in 0..n { (link(scene.parents[j].map_or(DVec3::ZERO, middle), middle(j))) }
@@ -70,7 +61,7 @@ fn picture(diagnosis: &Diagnosis, evidence: &Evidence, scene: &Scene, still: &[D
                 g.ghosts {}
                 @for (j, name) in scene.joints.iter().enumerate() {
                     @let ([x1, y1], [x2, y2]) = (point(still[2 * j]), point(still[2 * j + 1]));
-                    @let (class, style) = tone(boldness(diagnosis, evidence, name));
+                    @let (class, style) = tone(gauge.joint(name).and_then(|joint| gauge.boldness(joint)));
                     g class={ "joint " (class) } style=(style) data-joint=(name) {
                         title { (name) }
                         line.barrel x1=(short3(x1)) y1=(short3(y1)) x2=(short3(x2)) y2=(short3(y2)) {}
@@ -82,34 +73,33 @@ fn picture(diagnosis: &Diagnosis, evidence: &Evidence, scene: &Scene, still: &[D
                 span.muted.needs-script { "Drag or arrow keys turn it; a joint filters the page." }
                 span.tools.needs-script {
                     button type="button" data-play="log" { "Play the log" }
-                    @if scene.rollouts.len() > 1 {
-                        button type="button" data-play="rollout" { "Play a rollout" }
-                    }
+                    @for play in &scene.plays { button type="button" data-play=(play.name) { (play.label) } }
                 }
                 span.rollout-key.legend hidden[true] {
-                    span.swatch.measured {} " robot " span.swatch.before {} " model as described "
-                    @if scene.rollouts.len() > 2 { span.swatch.after {} " with the effects" }
+                    span.swatch.measured {} " robot " span.swatch.before {} " " (gauge.nominal) " "
+                    @if gauge.has_after() { span.swatch.after {} " " (gauge.corrected) }
                 }
             }
         }
     }
 }
 
+/// Joints whose numbers stand beside them; of more each shows as it is pointed at.
+const LABELLED: usize = 12;
+
 /// One entry for each joint: number, name, gap.
-fn chips(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
-    let torque = &diagnosis.gap.torque;
+fn chips(gauge: &Gauge) -> Markup {
     html! {
-        ol.chips aria-label="Torque gap of each joint" {
-            @for joint in &diagnosis.joints {
-                @let bold = boldness(diagnosis, evidence, joint);
+        ol.chips aria-label={ (super::words::capital(gauge.what)) " gap of each joint" } {
+            @for joint in &gauge.joints {
+                @let bold = gauge.boldness(joint);
                 @let (class, style) = tone(bold);
-                @let unit = words::torque_unit(joint, evidence, &diagnosis.gap.regimes);
                 li class=(class) style=(style) {
-                    a href={ "#torque" } data-pick=(joint) {
+                    a href={ "#" (super::OVER_TIME) } data-pick=(joint.name) {
                         i.dot aria-hidden="true" {}
-                        span.name { (joint) }
-                        @match (torque.rms.get(joint), bold) {
-                            (Some(rms), Some(_)) => b { (with_unit(&significant(*rms, 3), unit)) },
+                        span.name title=(joint.name) { bdi { (joint.name) } }
+                        @match (joint.before, bold) {
+                            (Some(gap), Some(_)) => b { (with_unit(&significant(gap.value, 3), &joint.unit)) },
                             (Some(_), None) => span.muted { "at the noise" },
                             (None, _) => span.muted { "–" },
                         }
@@ -128,7 +118,7 @@ struct View {
 
 impl View {
     fn of(scene: &Scene) -> View {
-        let all = || scene.frames.iter().flatten().copied().chain([DVec3::ZERO]);
+        let all = || scene.robot_frames().flatten().copied().chain([DVec3::ZERO]);
         let (low, high) = all().fold((DVec3::ZERO, DVec3::ZERO), |(a, b), p| (a.min(p), b.max(p)));
         let center = 0.5 * (low + high);
         let radius = all().map(|p| (p - center).length()).fold(0.0, f64::max);

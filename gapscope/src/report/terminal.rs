@@ -64,17 +64,23 @@ pub fn cut_to(text: &str, width: usize) -> String {
     short
 }
 
-/// Text broken at spaces into lines of at most `width` columns, to its last word.
+/// Text broken at spaces into lines of at most `width` columns, to its last word. Spaces within a line stay as many as they are.
 pub fn wrap(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![];
-    for word in text.split(' ').filter(|w| !w.is_empty()) {
+    let mut spaces = 0;
+    for word in text.split(' ') {
+        if word.is_empty() {
+            spaces += 1;
+            continue;
+        }
         match lines.last_mut() {
-            Some(line) if measure_text_width(line) + 1 + measure_text_width(word) <= width => {
-                line.push(' ');
+            Some(line) if measure_text_width(line) + spaces + 1 + measure_text_width(word) <= width => {
+                line.push_str(&" ".repeat(spaces + 1));
                 line.push_str(word);
             }
             _ => lines.push(word.to_string()),
         }
+        spaces = 0;
     }
     lines
 }
@@ -130,5 +136,18 @@ impl Paint {
             Verdict::UnknownEffect | Verdict::NotExcited => "1;31",
         };
         self.with(code, text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrapping_keeps_spaces_within_a_line_and_drops_them_at_its_ends() {
+        assert_eq!(wrap("EXPLAINED  1 effect", 40), ["EXPLAINED  1 effect"]);
+        assert_eq!(wrap("  EXPLAINED  1 effect explains ", 19), ["EXPLAINED  1 effect", "explains"]);
+        assert_eq!(wrap("one   two", 8), ["one", "two"]);
+        assert_eq!(wrap("a-word-that-is-wider  b", 6), ["a-word-that-is-wider", "b"]);
     }
 }

@@ -1,15 +1,15 @@
 //! The comparisons that decided, as a list that unfolds.
 
 use super::words;
-use gapscope_diagnosis::schema::{Diagnosis, Why};
+use gapscope_diagnosis::schema::Why;
 use maud::{Markup, html};
 
 /// Comparisons that are listed; the rest is in `diagnosis.json`.
 const LISTED: usize = 60;
 
 /// One entry for each kind that was taken, then one for all that was turned down; `None` where nothing was compared.
-pub fn render(diagnosis: &Diagnosis) -> Option<Markup> {
-    let (mut taken, mut not): (Vec<&Why>, Vec<&Why>) = diagnosis.why.iter().partition(|why| why.taken);
+pub fn render(why: &[Why], joints: &[String]) -> Option<Markup> {
+    let (mut taken, mut not): (Vec<&Why>, Vec<&Why>) = why.iter().partition(|why| why.taken);
     for list in [&mut taken, &mut not] {
         list.sort_by(|a, b| b.odds.total_cmp(&a.odds));
     }
@@ -21,7 +21,7 @@ pub fn render(diagnosis: &Diagnosis) -> Option<Markup> {
             @if !list.is_empty() {
                 details open[open] {
                     summary { (title) " (" (list.len()) ")" }
-                    ul.why { @for why in list.iter().take(LISTED) { (entry(why, diagnosis)) } }
+                    ul.why { @for why in list.iter().take(LISTED) { (entry(why, joints)) } }
                     @if list.len() > LISTED { p.note { "and " (list.len() - LISTED) " more in diagnosis.json" } }
                 }
             }
@@ -34,14 +34,14 @@ pub fn render(diagnosis: &Diagnosis) -> Option<Markup> {
     })
 }
 
-fn entry(why: &Why, diagnosis: &Diagnosis) -> Markup {
+fn entry(why: &Why, joints: &[String]) -> Markup {
     let odds = if why.odds.is_finite() { format!("{:+.1}", why.odds).replace('-', "−") } else { super::NONE.into() };
     html! {
         li data-joints=(super::listed(&why.joints)) {
             b.odds { (odds) }
             span {
                 (words::capital(&words::effect(&why.proposed)))
-                @if !why.joints.is_empty() { " at " (words::joints(&why.joints, &diagnosis.joints)) }
+                @if !why.joints.is_empty() { " at " (words::joints(&why.joints, joints)) }
                 span.muted { " against " (why.against.replace('_', " ")) }
             }
         }

@@ -20,6 +20,18 @@ pub fn effect(kind: &str) -> String {
     }
 }
 
+/// Effects in words, each once.
+pub fn effects(kinds: &[String]) -> Vec<String> {
+    let mut list: Vec<String> = vec![];
+    for kind in kinds {
+        let name = effect(kind);
+        if !list.contains(&name) {
+            list.push(name);
+        }
+    }
+    list
+}
+
 /// What the real robot does that the model does not, in one clause; empty for kinds outside the catalogue.
 pub fn meaning(kind: &str) -> &'static str {
     match kind {
@@ -44,6 +56,10 @@ pub fn meaning(kind: &str) -> &'static str {
         "parallel_spring" => "a spring, cable or counterbalance across the joint",
         "joint_zero_offset" => "the encoder's zero is off",
         "external_contact" => "an outside force for some of the time",
+        "servo_gain_error" => "the servo's proportional gain is not the one given",
+        "servo_damping_error" => "the servo's derivative gain or back-EMF is not the one given",
+        "speed_limit" => "the drive turns no faster than this",
+        "dead_band" => "the servo does nothing within an error of this size",
         "joint_coupling" => "friction or inertia on a sum of two joint speeds",
         _ => "",
     }
@@ -325,6 +341,11 @@ mod tests {
         let named = names(&["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_joint"]);
         assert_eq!(joints(&named, &named), "all 4 joints");
         assert_eq!(joints(&[], &named), "whole robot");
+    }
+
+    #[test]
+    fn an_effect_is_named_once() {
+        assert_eq!(effects(&names(&["payload", "backlash", "payload"])), ["payload", "backlash"]);
     }
 
     #[test]

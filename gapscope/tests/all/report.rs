@@ -1,6 +1,6 @@
 //! The pages as a person uses them: in a real browser where there is one; and the answer in short.
 
-use crate::support::{gapscope, pendulum, said};
+use crate::support::{chain, gapscope, pendulum, said, servo_arm};
 use std::path::Path;
 use std::process::Command;
 
@@ -38,6 +38,61 @@ fn report_and_index_work_in_a_browser() {
     assert!(!page.contains(&home), "no path of this machine is on the page");
     look(&[&dir.path().join("runs/first/report.html")], false);
     look(&[&dir.path().join("runs/index.html")], true);
+}
+
+#[test]
+fn a_servo_arm_without_torque_has_the_same_page_of_position() {
+    let dir = servo_arm();
+    let output = gapscope(dir.path(), ["diagnose", "robot.urdf", "log.csv", "--out", "servo"]);
+    let told = said(&output);
+    assert!(output.status.success() && told.contains("dry friction that the model lacks"), "{told}");
+    assert!(!told.contains(['\u{a0}', '\u{202f}']), "spaces are plain, so that the text can be searched: {told}");
+    let file = dir.path().join("servo/report.html");
+    let page = std::fs::read_to_string(&file).unwrap();
+    for section in
+        ["over-time", "effects", "drive", "laws", "joints", "regimes", "left", "open", "why", "data", "reproduce"]
+    {
+        assert!(page.contains(&format!("<section id=\"{section}\"")), "{section}");
+    }
+    for part in
+        ["position gap", "Play the free run", "perfect tracking", "class=\"band after\"", "--with servo/corrected.json"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    for word in ["NaN", ">inf", "Some(", "torque gap", &*dir.path().to_string_lossy()] {
+        assert!(!page.contains(word), "{word}");
+    }
+    let first = told.lines().next().unwrap();
+    assert!(page.contains(first.split(' ').next().unwrap()), "terminal and page begin alike");
+    assert!(page.len() < 600_000, "{} bytes", page.len());
+    look(&[&file], false);
+}
+
+#[test]
+#[ignore = "its diagnosis takes minutes"]
+fn thirty_joints_with_long_names_have_a_page_that_works() {
+    let dir = chain(30);
+    let output = gapscope(dir.path(), ["diagnose", "robot.urdf", "log.csv", "--out", "chain"]);
+    assert!(output.status.success(), "{}", said(&output));
+    let file = dir.path().join("chain/report.html");
+    let page = std::fs::read_to_string(&file).unwrap();
+    assert!(page.contains("_segment_30_rotation_joint") && page.len() < 2_000_000, "{} bytes", page.len());
+    look(&[&file], false);
+}
+
+#[test]
+fn the_next_experiment_plays_on_the_robot() {
+    let dir = pendulum();
+    // A second and a half tells nothing: the answer is a motion to log.
+    let log = std::fs::read_to_string(dir.path().join("log.csv")).unwrap();
+    let short: String = log.lines().take(301).map(|line| format!("{line}\n")).collect();
+    std::fs::write(dir.path().join("short.csv"), short).unwrap();
+    let output = gapscope(dir.path(), ["diagnose", "robot.urdf", "short.csv", "--out", "short"]);
+    assert!(output.status.success() && dir.path().join("short/next_experiment.csv").is_file(), "{}", said(&output));
+    let file = dir.path().join("short/report.html");
+    let page = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(page.matches("data-play=\"next\"").count(), 2, "beside the robot and beside the words");
+    look(&[&file], false);
 }
 
 #[test]

@@ -6,20 +6,22 @@ if (scene && skeleton) {
   const rows = scene.points.map((row) => unpack(row, scene.step));
   const time = unpack(scene.time, 0.001);
   const joints = scene.joints.length;
-  const rollouts = scene.rollouts.map(([name, points]) => ({ name, rows: points.map((row) => unpack(row, scene.step)) }));
+  const moving = ([name, points]) => ({ name, rows: points.map((row) => unpack(row, scene.step)) });
+  const plays = scene.plays.map((play) => ({ ...play, skeletons: play.skeletons.map(moving) }));
   // Center and radius as in skeleton.rs, so that the picture does not jump when the script takes over.
   const low = [0, 0, 0], high = [0, 0, 0];
-  rows.forEach((row, c) => row.forEach((x) => {
+  const stands = [rows, ...plays.map((play) => play.skeletons[0].rows)];
+  stands.forEach((rows) => rows.forEach((row, c) => row.forEach((x) => {
     low[c % 3] = Math.min(low[c % 3], x);
     high[c % 3] = Math.max(high[c % 3], x);
-  }));
+  })));
   const center = low.map((x, c) => 0.5 * (x + high[c]));
   let radius = 0;
-  for (let p = 0; p < rows.length; p += 3) {
-    for (let k = 0; k < time.length; k++) {
-      radius = Math.max(radius, Math.hypot(rows[p][k] - center[0], rows[p + 1][k] - center[1], rows[p + 2][k] - center[2]));
+  stands.forEach((rows) => {
+    for (let p = 0; p < rows.length; p += 3) {
+      rows[p].forEach((x, k) => { radius = Math.max(radius, Math.hypot(x - center[0], rows[p + 1][k] - center[1], rows[p + 2][k] - center[2])); });
     }
-  }
+  });
   radius = Math.max(radius, Math.hypot(...center)) || 1;
   let yaw = -0.6, pitch = 0.3, frame = scene.still, playing = null, rolled = 0;
 
@@ -58,7 +60,8 @@ if (scene && skeleton) {
   const ghosts = skeleton.querySelector(".ghosts");
 
   const draw = () => {
-    const points = playing === "rollout" ? at(rollouts[0].rows, Math.min(rolled, rollouts[0].rows[0].length - 1)) : at(rows, frame);
+    const play = plays.find((play) => play.name === playing), robot = play && play.skeletons[0].rows;
+    const points = play ? at(robot, Math.min(rolled, robot[0].length - 1)) : at(rows, frame);
     segments(points).forEach((segment, i) => place(links[i], segment));
     groups.forEach((group, j) => {
       const ends = [points[2 * j], points[2 * j + 1]];
@@ -73,7 +76,7 @@ if (scene && skeleton) {
       ring.push(project([0.35 * radius * Math.cos(angle), 0.35 * radius * Math.sin(angle), 0]).slice(0, 2).map((x) => x.toFixed(3)));
     }
     floor.setAttribute("points", ring.join(" "));
-    ghosts.replaceChildren(...(playing === "rollout" ? rollouts.slice(1).flatMap(ghost) : []));
+    ghosts.replaceChildren(...(play ? play.skeletons.slice(1).flatMap(ghost) : []));
   };
   const ghost = ({ name, rows }) => {
     const end = rows[0].length - 1;
@@ -149,17 +152,20 @@ if (scene && skeleton) {
       return;
     }
     playing = button.dataset.play;
-    button.textContent = "Stop";
-    document.querySelector(".rollout-key").hidden = playing !== "rollout";
+    buttons.forEach((other) => { if (other.dataset.play === playing) other.textContent = "Stop"; });
+    // The button may stand far from the robot that it moves.
+    const seen = skeleton.getBoundingClientRect();
+    if (seen.bottom < 0.5 * seen.height || seen.top > innerHeight - 0.5 * seen.height) skeleton.scrollIntoView({ block: "center" });
+    const play = plays.find((play) => play.name === playing);
+    document.querySelector(".rollout-key").hidden = !play || play.skeletons.length < 2;
     const start = performance.now(), first = frame >= time.length - 1 ? 0 : frame, t0 = time[Math.floor(first)];
     let k = Math.floor(first);
     const step = (now) => {
       if (playing !== button.dataset.play) return;
       const seconds = Math.max(0, now - start) / 1000;
-      if (playing === "rollout") {
-        // A quarter of the robot's speed: a rollout is short.
-        const length = rollouts[0].rows[0].length - 1;
-        rolled = (seconds / 4 / scene.horizon % 1.15) * length;
+      if (play) {
+        // After the end the last moment stays for a while, then all begins anew.
+        rolled = (seconds * play.pace / play.length % 1.15) * (play.skeletons[0].rows[0].length - 1);
       } else {
         while (k < time.length - 1 && time[k + 1] <= t0 + seconds) k++;
         if (k >= time.length - 1) {

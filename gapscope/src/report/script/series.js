@@ -1,10 +1,11 @@
-// Torque of one joint over time: measured, model as described, model with the effects; zoom, pan, readout.
+// Torque or position of one joint over time: measured, nominal, corrected; zoom, pan, readout. The words come with the data.
 let show = () => {}, follow = () => {};
 const live = document.getElementById("live");
-if (live && data.torque.length && window.uPlot) {
+if (live && data.series.length && window.uPlot) {
+  const words = data.words;
   const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const select = live.querySelector("select"), box = live.querySelector(".chart"), readout = live.querySelector("output");
-  const series = data.torque.map((s) => {
+  const series = data.series.map((s) => {
     const values = { ...s, t: unpack(s.t, 0.001), m: unpack(s.m, s.step), n: unpack(s.n, s.step), c: unpack(s.c, s.step) };
     // A new episode begins: no line joins the two.
     s.breaks.forEach((k) => [values.m, values.n, values.c].forEach((row) => { if (row.length) row[k] = null; }));
@@ -19,27 +20,27 @@ if (live && data.torque.length && window.uPlot) {
       return;
     }
     const { t, m, n, c, unit } = current;
-    const parts = ["t " + t[k].toFixed(2) + " s", "measured " + figure(m[k]), "as described " + figure(n[k])];
-    if (c.length) parts.push("with the effects " + figure(c[k]));
+    const parts = ["t " + t[k].toFixed(2) + " s", "measured " + figure(m[k]), words.nominal + " " + figure(n[k])];
+    if (c.length) parts.push(words.corrected + " " + figure(c[k]));
     parts.push("gap " + figure(m[k] == null ? null : m[k] - n[k]) + (c.length ? " → " + figure(m[k] == null ? null : m[k] - c[k]) : "") + " " + unit);
     readout.textContent = parts.join(" · ");
   };
   const options = () => {
     const ink = color("--muted"), grid = color("--grid"), font = "12px system-ui, sans-serif";
     const axis = { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, font, labelFont: font, labelSize: 18 };
-    const list = [{}, { label: "measured", stroke: color("--measured-line"), width: 2.5 }, { label: "as described", stroke: color("--before"), width: 1.4 }];
-    if (current.c.length) list.push({ label: "with the effects", stroke: color("--after"), width: 1.4, dash: [6, 3] });
+    const list = [{}, { label: "measured", stroke: color("--measured-line"), width: 2.5 }, { label: words.nominal, stroke: color("--before"), width: 1.4 }];
+    if (current.c.length) list.push({ label: words.corrected, stroke: color("--after"), width: 1.4, dash: [6, 3] });
     const shade = color("--shade");
     return {
       width: box.clientWidth, height: tall(),
-      legend: { show: false }, cursor: { drag: { x: true, y: false }, focus: { prox: 24 }, sync: { key: "torque" } },
+      legend: { show: false }, cursor: { drag: { x: true, y: false }, focus: { prox: 24 }, sync: { key: "time" } },
       scales: { x: { time: false } }, series: list,
       bands: [{ series: [1, 2], fill: shade }, { series: [2, 1], fill: shade }],
-      axes: [{ ...axis, size: 28 }, { ...axis, label: "torque, " + current.unit, size: 56 }],
+      axes: [{ ...axis, size: 28 }, { ...axis, label: words.what + ", " + current.unit, size: 56 }],
       hooks: { setCursor: [() => { say(); if (chart.cursor.idx != null) pose(current.t[chart.cursor.idx]); }], setScale: [same] },
     };
   };
-  // What is left of the measured torque: a gap of a newton metre shows beside none of sixty.
+  // What the models leave of what was measured: a gap of a newton metre shows beside none of sixty.
   const below = () => {
     const { series: lines, axes, bands: _, hooks: __, ...rest } = options();
     return {

@@ -1,0 +1,63 @@
+//! What `gapscope export` takes.
+
+use crate::input::Reading;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// Arguments of `export`.
+#[derive(Debug, Args)]
+pub struct Export {
+    /// Folder that `diagnose` wrote, or the corrected.json in it
+    pub results: PathBuf,
+    /// Robot description that the diagnosis was made with: URDF, xacro or MJCF
+    #[arg(long, value_name = "FILE")]
+    pub robot: PathBuf,
+    /// What to write, separated by commas; isaaclab needs the URDF and writes it too
+    #[arg(long, value_enum, value_name = "TARGET", value_delimiter = ',', required_unless_present = "ranges")]
+    pub to: Vec<Target>,
+    /// Write a region of parameters that holds the robot with 90 %, ranges.json, and sample_ranges.py that samples it
+    #[arg(long)]
+    pub ranges: bool,
+    /// Logs on which to predict what the shrink falls by in the target: best ones that the diagnosis did not see
+    #[arg(long, value_name = "LOG", num_args = 1..)]
+    pub logs: Vec<PathBuf>,
+    /// How robot and logs are read
+    #[command(flatten)]
+    pub reading: Reading,
+    /// Length of a step in a target that has one of its own (c), s [default: that of the residual, or 0.001]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
+    pub dt: Option<f64>,
+    /// Residual on top of the corrected model, a folder of `gapscope train residual --with`; for the target c
+    #[arg(long, value_name = "DIR")]
+    pub residual: Option<PathBuf>,
+    /// Folder for the files of the targets and ledger.json [default: a new folder in that of the results]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace files that are in the folder already
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Targets by their names on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Target {
+    /// The robot's own URDF, edited
+    Urdf,
+    /// MuJoCo's model file
+    Mjcf,
+    /// A configuration for Isaac Lab
+    Isaaclab,
+    /// One C99 file that steps the robot
+    C,
+}
+
+impl From<Target> for gapscope_export::Target {
+    fn from(target: Target) -> gapscope_export::Target {
+        match target {
+            Target::Urdf => gapscope_export::Target::Urdf,
+            Target::Mjcf => gapscope_export::Target::Mjcf,
+            Target::Isaaclab => gapscope_export::Target::IsaacLab,
+            Target::C => gapscope_export::Target::C,
+        }
+    }
+}

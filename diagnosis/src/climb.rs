@@ -62,6 +62,12 @@ impl Rival {
     }
 }
 
+/// Whether some joint is left less by as much as concerns anyone: mean squares of what two accounts leave of each, (N m)² or N².
+pub fn is_material(problem: &Problem, without: &[f64], with: &[f64]) -> bool {
+    let moved = |j: usize| without[j] - with[j] > (MATERIAL * problem.scale[j]).powi(2);
+    (0..with.len()).any(moved)
+}
+
 /// Kinds in a set, ascending.
 pub fn kinds(problem: &Problem, set: &[usize]) -> Vec<Kind> {
     let mut kinds: Vec<Kind> = set.iter().map(|&c| problem.entries[c].candidate.kind).collect();
@@ -221,8 +227,7 @@ impl<'a> Competition<'a> {
         for kind in kinds(self.problem, &set) {
             let rest = self.without(&set, |c| self.kind(c) == kind);
             let Some(without) = score.left(&self.problem.columns(&rest)) else { continue };
-            let moved = |j: usize| without[j] - with[j] > (MATERIAL * self.problem.scale[j]).powi(2);
-            if !(0..with.len()).any(moved) {
+            if !is_material(self.problem, &without, &with) {
                 set = rest;
             }
         }

@@ -113,6 +113,11 @@ impl Chosen {
         self.exact.entries.iter().any(|e| e.candidate.turns())
     }
 
+    /// Whether it leaves some joint less than another account, by as much as concerns anyone.
+    pub(crate) fn concerns_beside(&self, other: &Chosen) -> bool {
+        climb::is_material(&self.exact, &other.exact.left(&other.fit), &self.exact.left(&self.fit))
+    }
+
     /// Whether a drive turns on its own, and has the rotor that does.
     pub(crate) fn has_rotor(&self) -> bool {
         let rotor = |i: usize| self.fit.own(&self.exact, i).1.iter().all(|inertia| *inertia > 0.0);
@@ -238,7 +243,7 @@ impl Logs<'_> {
             let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
             let without = chosen.with(Choice { set }, exact, fit);
             let mut odds = chosen.odds_against(&without, self)?;
-            if odds <= 0.0 {
+            if odds <= 0.0 || !(kind.is_outside() || chosen.concerns_beside(&without)) {
                 chosen = without;
                 continue;
             }

@@ -71,7 +71,7 @@ impl Logs<'_> {
         let stiff = self.converge(best.all.clone(), best.choice.clone(), rigid.noise.clone(), None, progress)?;
         let rigid = if stiff.odds_against(&rigid, self)? > 0.0 { stiff } else { rigid };
         let odds = best.odds_against(&rigid, self)?;
-        if odds <= 0.0 {
+        if odds <= 0.0 || !best.concerns_beside(&rigid) {
             return Ok(Chosen { tried, ..rigid });
         }
         let turned = best.turned.map(|turned| Turned { odds, ..turned });

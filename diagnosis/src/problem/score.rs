@@ -169,6 +169,12 @@ impl Problem {
         &self.correlation
     }
 
+    /// Mean square of what a fit leaves of each joint, (N m)² or N².
+    pub fn left(&self, fit: &Fit) -> Vec<f64> {
+        let mean_square = |rest: Vec<f64>| rest.iter().map(|x| x * x).sum::<f64>() / rest.len().max(1) as f64;
+        self.joints.iter().map(|joint| mean_square(joint.residual(&fit.columns, &fit.theta))).collect()
+    }
+
     /// What logs say for an account at its exact law, as good as the whole problem is linear about it (Laplace). What is left
     /// has heavy tails, so that neither a glitch nor a blow decides, and a level of its own in each band of frequencies
     /// (Whittle, Arkiv för Matematik 2(23) 1953): noise at some of them does not drown what the others say.

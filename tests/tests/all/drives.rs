@@ -49,7 +49,6 @@ fn a_spring_behind_an_encoder_on_the_link() {
 }
 
 #[test]
-#[ignore = "a zero offset beside it since the competition on one score: issue 23"]
 fn a_spring_behind_an_encoder_on_the_motor() {
     named(None, 0.9, true);
 }

@@ -24,7 +24,6 @@ fn named(effect: Effect) {
 }
 
 #[test]
-#[ignore = "named alone and at the right size, but at .88 since accounts are told at one noise: issue 23"]
 fn a_delay_in_noisy_effort() {
     named(Effect::ActuationDelay(ActuationDelay { delay: 0.012 }));
 }
@@ -35,7 +34,6 @@ fn a_lag_in_noisy_effort() {
 }
 
 #[test]
-#[ignore = "called a delay since the competition on one score: issue 23"]
 fn a_short_lag_is_no_delay_for_certain_where_a_servo_answers_to_noise() {
     // A servo's answer to the noise of the position goes with that noise, and so would speak for a delay.
     let found = found(&Effect::ActuatorLag(ActuatorLag { time_constant: 0.0058 }), 1e-5);

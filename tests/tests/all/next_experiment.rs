@@ -51,7 +51,6 @@ fn assert_within_limits(model: &Model, trajectory: &Trajectory) {
 }
 
 #[test]
-#[ignore = "the tie is not said since the competition on one score: issue 23"]
 fn following_the_advice_resolves_the_tie() {
     let model = robot("arm6");
     let kind = "torque_bias";

@@ -490,6 +490,8 @@ impl Logs<'_> {
             if late.is_some_and(|doubt| doubt > (-TIE).exp()) {
                 confused.extend(LATE.iter().filter(|other| **other != kind).map(|k| k.name().to_owned()));
             }
+            confused.sort();
+            confused.dedup();
             // What other joints leave says nothing against it.
             let joints: Vec<usize> = own.iter().flat_map(|&c| problem.entries[c].candidate.joints.clone()).collect();
             let misfit = misfit.map_or(0.0, |judged| judged.unexplained_of(&joints));

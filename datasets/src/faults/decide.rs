@@ -30,8 +30,9 @@ const SCALE_COST: f64 = 8.0;
 const BESIDE: f64 = 30.0;
 /// Zeros off by less than this are an effect, rad.
 const ZERO: f64 = 20.0 * std::f64::consts::PI / 180.0;
-/// A joint under another's name leaves more than this of its effort, squared: what follows a joint's motion so well is its own.
-const OWN: f64 = 0.1;
+/// Under its own name a joint leaves at most this part of what it left under another's, squared: a spring beside friction that
+/// nobody knows makes exchanged names leave a third.
+const OWN: f64 = 0.25;
 /// An account is none where it leaves more than this of the effort, as a geometric mean of squared shares.
 const EXPLAINS: f64 = 0.45;
 /// As logged some joint must leave more than this of its effort, squared, for a fault to be beyond doubt, ...
@@ -117,7 +118,7 @@ impl Decision<'_> {
                 let own = self.model.gravity();
                 (gravity - own).length() < ZERO * own.length()
             }),
-            Kind::Order => account.joints.iter().any(|&j| logged.0.unexplained[j] < OWN),
+            Kind::Order => account.joints.iter().any(|&j| weighed.unexplained[j] > OWN * logged.0.unexplained[j]),
             Kind::Sign | Kind::Axis => false,
         };
         if small || margin < LIKELY {

@@ -33,6 +33,7 @@ fn the_diagnosis_has_the_fields_of_its_specification() {
             "verdict",
             "gap",
             "effects",
+            "combinations",
             "alternatives",
             "unexplained",
             "shrink",

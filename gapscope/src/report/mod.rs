@@ -226,6 +226,9 @@ fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Set
         (section("effects", "Effects", "What the robot does that the model does not, strongest first. Of the effects reported with a confidence of 90 %, nine in ten are there.",
             &effects::render(&diagnosis.effects, &diagnosis.joints, "alone, torque gap shrinks by", words::nothing_found(diagnosis.verdict))))
         @if evaluated { (figures(gauge, diagnosis, evidence)) }
+        @if let Some(bodies) = rest::bodies(diagnosis) {
+            (section("bodies", "What the logs tell of bodies", "Sums over all that a joint carries, where those of single links are not told: differences from the robot description, surest first.", &bodies))
+        }
         (section("alternatives", "What else it could be", "Other sets of effects that these logs do not exclude.", &rest::alternatives(diagnosis)))
         @if let Some(why) = why::render(&diagnosis.why, &diagnosis.joints) {
             (section("why", "Why it is so", "What was proposed, against what, and by how much the logs spoke for it.", &why))

@@ -1,9 +1,9 @@
 //! What follows the figures: what is left, alternatives, the next experiment, the data, and how to check it all.
 
 use super::effects::meter;
-use super::format::{NONE, count, figure, group, percent, plain, with_unit};
+use super::format::{NONE, count, figure, group, percent, plain, with_interval, with_unit};
 use super::{heatmap, words};
-use gapscope_diagnosis::schema::{Diagnosis, Evidence, Gap, Verdict};
+use gapscope_diagnosis::schema::{Combination, Diagnosis, Evidence, Gap, Verdict};
 use maud::{Markup, html};
 
 /// What is left after the effects, and where.
@@ -40,6 +40,26 @@ pub fn sentence(diagnosis: &Diagnosis) -> String {
         "{fraction} of the squared torque gap is left above the noise floor{when}{place}. {}",
         words::rest(left, &diagnosis.joints)
     )
+}
+
+/// What the logs determine of bodies; nothing where no body differs.
+pub fn bodies(diagnosis: &Diagnosis) -> Option<Markup> {
+    let row = |sum: &Combination| {
+        let (value, ends) = with_interval(sum.value, Some(sum.ci95));
+        html! {
+            tr {
+                th scope="row" { (words::capital(&sum.words)) }
+                td.number { (with_unit(&value, &sum.unit)) }
+                td.number.nowrap { (ends.unwrap_or_default()) }
+            }
+        }
+    };
+    (!diagnosis.combinations.is_empty()).then(|| html! {
+        table.plain {
+            thead { tr { th scope="col" { "of" } th.number scope="col" { "off by" } th.number scope="col" { "95 %" } } }
+            tbody { @for sum in &diagnosis.combinations { (row(sum)) } }
+        }
+    })
 }
 
 /// Other sets of effects that the logs do not exclude.

@@ -61,6 +61,8 @@ fn every_verdict_is_well_formed_finite_small_and_repeatable() {
             page.contains(words::verdict(diagnosis.verdict))
                 && plain::answer(&diagnosis).iter().all(|line| page.contains(&maud::html! { (line) }.into_string()))
         );
+        let of_bodies = page.contains("Mass of panda_link7 and all it carries");
+        assert_eq!(of_bodies, !diagnosis.combinations.is_empty(), "{name}");
         let words = without_scripts(&page);
         for word in ["http://", "https://", " src=", "@import", "url("] {
             assert!(!words.contains(word), "{name}: {word} would reach out");

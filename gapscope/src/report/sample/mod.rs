@@ -78,7 +78,13 @@ pub fn explained() -> Case {
         verdict: Verdict::Explained,
         gap: gap(&names, &rms, regimes(&names)),
         effects: vec![coulomb_effect, payload, viscous_effect, delay],
-        combinations: Vec::new(),
+        combinations: vec![Combination {
+            words: "mass of panda_link7 and all it carries".into(),
+            terms: [("mass_delta.panda_joint7".to_owned(), 1.0)].into(),
+            value: 0.76,
+            ci95: [0.72, 0.80],
+            unit: "kg".into(),
+        }],
         alternatives: vec![
             Alternative { effects: vec!["stribeck_friction".into(), "payload".into()], probability: 0.11 },
             Alternative { effects: vec!["coulomb_friction".into(), "link_inertia_error".into()], probability: 0.02 },
@@ -147,6 +153,7 @@ pub fn partly() -> Case {
     let resembles = Some(Resemblance { laws, share: 0.87 });
     diagnosis.unexplained = Unexplained { fraction: 0.284, learnable: 0.62, resembles, regimes: regimes(&names) };
     diagnosis.alternatives.clear();
+    diagnosis.combinations.clear();
     ("partly", diagnosis, evidence)
 }
 
@@ -234,6 +241,7 @@ pub fn prismatic() -> Case {
     diagnosis.effects = vec![found("coulomb_friction", &names, 0.999, 0.9, &[("coulomb", Parameter::PerJoint(map))])];
     diagnosis.unexplained = Unexplained { fraction: 0.0, learnable: 0.0, resembles: None, regimes: vec![] };
     diagnosis.alternatives.clear();
+    diagnosis.combinations.clear();
     diagnosis.next_experiment = None;
     diagnosis.power = power(&names)[..1].to_vec();
     diagnosis.power[0].unit = "N".into();

@@ -34,6 +34,8 @@ pub fn render(effects: &[FoundEffect], joints: &[String], shrinks: &str, nothing
 
 fn row(effect: &FoundEffect, all: &[String], shrinks: &str) -> Markup {
     let apart = words::effects(&effect.indistinguishable_from);
+    // Links that stand together have no shrink of their own.
+    let unknown = if effect.parameters.is_empty() { "–" } else { "at the floor" };
     html! {
         tbody data-joints=(super::listed(&effect.joints)) {
             tr.effect {
@@ -45,7 +47,7 @@ fn row(effect: &FoundEffect, all: &[String], shrinks: &str) -> Markup {
                 td.joints data-label="joints" title=(effect.joints.join(", ")) { (words::joints(&effect.joints, all)) }
                 td.nowrap data-label="confidence" { (meter(effect.confidence)) " " (format::probability_figure(effect.confidence)) "\u{202f}%" }
                 td.number data-label=(shrinks) {
-                    (effect.shrink.torque.map_or("at the floor".into(), percent))
+                    (effect.shrink.torque.map_or(unknown.into(), percent))
                     @if let Some(interval) = effect.shrink.ci95 { " " span.muted.nowrap { (percent_interval(interval)) } }
                 }
                 td data-label="cannot be told from" {
@@ -54,7 +56,7 @@ fn row(effect: &FoundEffect, all: &[String], shrinks: &str) -> Markup {
             }
             tr.parameters {
                 td colspan="5" {
-                    @if effect.parameters.is_empty() { span.muted { "no parameters" } } @else { (parameters(effect, all)) }
+                    @if effect.parameters.is_empty() { span.muted { "below, as sums: of single links these logs tell little" } } @else { (parameters(effect, all)) }
                 }
             }
         }

@@ -224,7 +224,7 @@ fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Set
             (section("change", "What to change", "", &paste))
         }
         (section("effects", "Effects", "What the robot does that the model does not, strongest first. Of the effects reported with a confidence of 90 %, nine in ten are there.",
-            &effects::render(&diagnosis.effects, &diagnosis.joints, "alone, torque gap shrinks by", words::nothing_found(diagnosis.verdict))))
+            &effects::render(&plain::together(diagnosis), &diagnosis.joints, "alone, torque gap shrinks by", words::nothing_found(diagnosis.verdict))))
         @if evaluated { (figures(gauge, diagnosis, evidence)) }
         @if let Some(bodies) = rest::bodies(diagnosis) {
             (section("bodies", "What the logs tell of bodies", "Sums over all that a joint carries, where those of single links are not told: differences from the robot description, surest first.", &bodies))

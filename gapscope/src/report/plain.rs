@@ -66,7 +66,7 @@ pub fn together(diagnosis: &Diagnosis) -> Vec<FoundEffect> {
         other.indistinguishable_from.dedup();
         // Neither values nor the shrink of one link are those of all.
         other.parameters.clear();
-        other.shrink.torque = None;
+        (other.shrink.torque, other.shrink.ci95) = (None, None);
     }
     read
 }

@@ -41,6 +41,9 @@ impl Outcome {
         });
         let is_gone = |effect: &Effect| gone.contains(&(effect.kind().name().to_owned(), effect.law().joints()));
         self.corrected.effects.retain(|effect| !is_gone(effect));
+        // Sums and errors were those of all effects together.
+        diagnosis.combinations.clear();
+        diagnosis.covariance = None;
         diagnosis.effects.iter_mut().for_each(|effect| effect.confidence = effect.confidence.min(COULD_BE));
         if diagnosis.effects.is_empty() {
             let shrink = &mut diagnosis.shrink;

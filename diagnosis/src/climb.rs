@@ -137,13 +137,13 @@ pub fn rivals(problem: &Problem, chosen: &Choice) -> Vec<Rival> {
         .collect()
 }
 
-/// The likeliest account with a candidate of another kind in the place of some that were chosen, the two held against each
-/// other by what they leave alone; `None` where the logs miss nothing in that place.
-pub fn swap(problem: &Problem, chosen: &Choice, gone: &[usize]) -> Option<Rival> {
+/// The likeliest account with a candidate of another kind in the place of one that was chosen, the two held against each other
+/// by what they leave alone; `None` where the logs miss nothing in that place.
+pub fn swap(problem: &Problem, chosen: &Choice, gone: usize) -> Option<Rival> {
     let competition = Competition::new(problem);
-    let without = competition.kind(*gone.first()?);
+    let without = competition.kind(gone);
     let best = competition.account(chosen.set.clone(), &problem.score())?;
-    let base = competition.without(&chosen.set, |c| gone.contains(&c));
+    let base = competition.without(&chosen.set, |c| c == gone);
     let solve = |set: &[usize]| best.score.solve(&problem.columns(set));
     let (own, missing) = (solve(&best.set)?, solve(&base)?);
     if own.likeliest() - missing.likeliest() < MISSED {
@@ -256,9 +256,9 @@ impl<'a> Competition<'a> {
             let next = if wide { self.far(&here, forbidden) } else { self.near(&here, forbidden) };
             // At its own noise a move may lose what it gains at this one, and gain what it does not: where something large is
             // missed, the noise of its joint is what is missed.
-            let rises = |nats: f64| nats > here.nats + RISE;
-            let better = (next.into_iter().take(SHORTLIST))
-                .find_map(|(_, set)| self.account(set, &here.score).filter(|account| rises(account.nats)));
+            let rises = |account: &Account<'_>| account.nats > here.nats + RISE;
+            let better =
+                (next.into_iter().take(SHORTLIST)).find_map(|(_, set)| self.account(set, &here.score).filter(rises));
             match better {
                 Some(better) => {
                     here = better;

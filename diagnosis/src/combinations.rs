@@ -4,6 +4,7 @@
 //! Automation 6(3) 1990). So for each joint three things are asked of that body, all joints beyond it at zero: its mass, its first
 //! moment across the axis, its inertia about the axis. What the logs hold better than the URDF did is told.
 
+use crate::covariance::HALF;
 use crate::estimate::Fit;
 use crate::problem::Problem;
 use crate::schema::Combination;
@@ -13,8 +14,6 @@ use std::collections::BTreeMap;
 
 /// Logs determine a sum whose interval is narrower than this part of the one that it had before them.
 const DETERMINED: f64 = 0.5;
-/// Half of a normal 95 % interval, in standard deviations.
-const HALF: f64 = 1.96;
 /// A direction counts as across an axis where its cosine with it is below this.
 const ACROSS: f64 = 0.5;
 /// Public names of the ten inertial parameters.

@@ -7,7 +7,7 @@ use gapscope_effects::Effect;
 use nalgebra::DMatrix;
 
 /// Half of a normal 95 % interval, in standard errors.
-const HALF: f64 = 1.959_963_984_540_054;
+pub const HALF: f64 = 1.959_963_984_540_054;
 /// A correlation says no more than so many parts of one.
 const DIGITS: f64 = 1e6;
 

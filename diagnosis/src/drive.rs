@@ -27,7 +27,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
-use std::borrow::{Borrow, Cow};
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 /// Resonances of the link on its locked motor that are tried first, Hz.
@@ -331,39 +331,34 @@ impl<'a> Study<'a> {
 
     /// The same of several, each of these runs or those, a drive and a rotor.
     fn rows_each(&self, asked: &[(Runs, &Candidate, f64)], view: View) -> Vec<Vec<f64>> {
-        let seen: Vec<usize> = (0..self.runs.len()).filter(|e| view.episode.is_none_or(|only| only == *e)).collect();
-        let run = |of: Runs, e: usize| match of {
-            Runs::Logged => self.runs[e],
-            Runs::Noisier => &self.noisier[e],
-        };
         let all: Vec<(&JointRun, &Candidate, f64)> = (asked.iter())
-            .flat_map(|&(of, drive, rotor)| seen.iter().map(move |&e| (run(of, e), drive, rotor)))
+            .flat_map(|&(of, drive, rotor)| self.episodes(view).map(move |e| (self.run(of, e), drive, rotor)))
             .collect();
         let mut left = JointRun::left_by_each(&all).into_iter();
-        let rows = |_| {
-            let mut rows = vec![0.0; self.logs.band.rows.len()];
-            for (&e, torque) in seen.iter().zip(&mut left) {
-                self.place(&mut rows, e, smooth(torque, view.smooth, self.runs[e].dt));
-            }
-            rows
-        };
-        asked.iter().map(rows).collect()
+        asked.iter().map(|_| self.at_rows(view, |_| left.next().unwrap_or_default())).collect()
     }
 
-    /// Puts a torque of a run at its rows of the band.
-    fn place(&self, rows: &mut [f64], e: usize, torque: Vec<f64>) {
-        let at_rows = self.logs.band.filter_where(e, &self.slides[e], &torque);
-        for (row, seen) in rows[self.logs.band.of_episode[e].clone()].iter_mut().zip(at_rows) {
-            *row = seen.unwrap_or(0.0);
+    fn run(&self, of: Runs, episode: usize) -> &JointRun {
+        match of {
+            Runs::Logged => self.runs[episode],
+            Runs::Noisier => &self.noisier[episode],
         }
     }
 
-    /// A torque of each run at the rows of the band, in a view.
-    fn rows_of(&self, runs: &[impl Borrow<JointRun>], view: View, torque: impl Fn(&JointRun) -> Vec<f64>) -> Vec<f64> {
+    /// Episodes that are looked at.
+    fn episodes(&self, view: View) -> impl Iterator<Item = usize> {
+        (0..self.runs.len()).filter(move |e| view.episode.is_none_or(|only| only == *e))
+    }
+
+    /// A torque of each episode at the rows of the band, in a view.
+    fn at_rows(&self, view: View, mut torque: impl FnMut(usize) -> Vec<f64>) -> Vec<f64> {
         let mut rows = vec![0.0; self.logs.band.rows.len()];
-        for (e, run) in runs.iter().enumerate().filter(|(e, _)| view.episode.is_none_or(|only| only == *e)) {
-            let run: &JointRun = run.borrow();
-            self.place(&mut rows, e, smooth(torque(run), view.smooth, run.dt));
+        for e in self.episodes(view) {
+            let seen = smooth(torque(e), view.smooth, self.runs[e].dt);
+            let at_rows = self.logs.band.filter_where(e, &self.slides[e], &seen);
+            for (row, seen) in rows[self.logs.band.of_episode[e].clone()].iter_mut().zip(at_rows) {
+                *row = seen.unwrap_or(0.0);
+            }
         }
         rows
     }

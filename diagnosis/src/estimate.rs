@@ -153,14 +153,16 @@ impl Fit {
         effects
     }
 
-    /// Half-widths of the 95 % intervals of the coefficients: the wider of what blocks of time tell, and parts of the speed of
-    /// any of the `joints`.
-    pub fn half_widths(&self, problem: &Problem, joints: &[usize], speeds: &[Vec<usize>]) -> Vec<f64> {
-        let squares: Vec<DVector<f64>> = std::iter::once(self.over_time(problem))
-            .chain(joints.iter().map(|&j| self.over_speed(problem, &speeds[j])))
-            .map(|all| all.diagonal())
-            .collect();
-        (0..self.columns.len()).map(|i| squares.iter().map(|of| of[i]).fold(0.0, f64::max).sqrt()).collect()
+    /// Half-widths of the 95 % intervals of each candidate's own coefficients: the wider of what blocks of time tell, and parts of
+    /// the speed of any of its joints.
+    pub fn half_widths(&self, problem: &Problem, candidates: &[usize], speeds: &[Vec<usize>]) -> Vec<Vec<f64>> {
+        let mut widths = Widths::new(self, problem, speeds);
+        let of = |&c: &usize| {
+            let (at, _) = self.own(problem, c);
+            let accounts = widths.accounts(&problem.entries[c].candidate.joints, &at);
+            (0..at.len()).map(|i| accounts.iter().map(|of| of[(i, i)]).fold(0.0, f64::max).sqrt()).collect()
+        };
+        candidates.iter().map(of).collect()
     }
 
     /// Parameters of an effect of a kind made of some candidates under their public names, with 95 % intervals.
@@ -184,20 +186,12 @@ impl Fit {
         candidates: &[usize],
         speeds: &[Vec<usize>],
     ) -> Vec<Told> {
-        let over_time = self.over_time(problem);
-        let mut over_speed: BTreeMap<usize, DMatrix<f64>> = BTreeMap::new();
+        let mut widths = Widths::new(self, problem, speeds);
         let mut told = Vec::new();
         for &c in candidates {
             let (at, theta) = self.own(problem, c);
             let candidate = &problem.entries[c].candidate;
-            for &j in &candidate.joints {
-                over_speed.entry(j).or_insert_with(|| self.over_speed(problem, &speeds[j]));
-            }
-            // Squares of half-widths.
-            let accounts: Vec<DMatrix<f64>> = std::iter::once(&over_time)
-                .chain(candidate.joints.iter().filter_map(|j| over_speed.get(j)))
-                .map(|all| DMatrix::from_fn(at.len(), at.len(), |i, k| all[(at[i], at[k])]))
-                .collect();
+            let accounts = widths.accounts(&candidate.joints, &at);
             let values = |theta: &[f64]| -> Option<Vec<Value>> {
                 let effects = problem.entries[c].effects(model, theta, self.without);
                 Some(effects.iter().find(|e| e.kind() == kind)?.law().parameters())
@@ -258,10 +252,36 @@ impl Fit {
     pub fn over_time(&self, problem: &Problem) -> DMatrix<f64> {
         problem.covariance(&self.columns, &self.theta) * quantile(problem.blocks_used()).powi(2)
     }
+}
 
-    /// The same by what parts of a joint's speed tell; `part` has that of each row of the band.
-    fn over_speed(&self, problem: &Problem, part: &[usize]) -> DMatrix<f64> {
-        problem.covariance_over(&self.columns, &self.theta, part) * quantile(PARTS).powi(2)
+/// Squares of half-widths of 95 % intervals of the coefficients of a fit, by every account that there is of them.
+struct Widths<'a> {
+    fit: &'a Fit,
+    problem: &'a Problem,
+    /// The part of the speed of each joint in which each row of the band is.
+    speeds: &'a [Vec<usize>],
+    over_time: DMatrix<f64>,
+    /// By parts of the speed of the joints that were asked for.
+    over_speed: BTreeMap<usize, DMatrix<f64>>,
+}
+
+impl<'a> Widths<'a> {
+    fn new(fit: &'a Fit, problem: &'a Problem, speeds: &'a [Vec<usize>]) -> Widths<'a> {
+        Widths { fit, problem, speeds, over_time: fit.over_time(problem), over_speed: BTreeMap::new() }
+    }
+
+    /// Of the coefficients at some places of the fit: by blocks of time, then by parts of the speed of each of some joints.
+    fn accounts(&mut self, joints: &[usize], at: &[usize]) -> Vec<DMatrix<f64>> {
+        let Widths { fit, problem, speeds, over_time, over_speed } = self;
+        for &j in joints {
+            over_speed.entry(j).or_insert_with(|| {
+                problem.covariance_over(&fit.columns, &fit.theta, &speeds[j]) * quantile(PARTS).powi(2)
+            });
+        }
+        std::iter::once(&*over_time)
+            .chain(joints.iter().filter_map(|j| over_speed.get(j)))
+            .map(|all| DMatrix::from_fn(at.len(), at.len(), |i, k| all[(at[i], at[k])]))
+            .collect()
     }
 }
 

@@ -4,7 +4,7 @@ use crate::band::Band;
 use crate::estimate::Fit;
 use crate::gap::Rows;
 use crate::problem::Problem;
-use crate::schema::{EffectCurve, Evidence, TorqueSeries};
+use crate::schema::{EffectCurve, Evidence, Series};
 use crate::signals::Signals;
 use gapscope_dynamics::{JointKind, Model};
 use gapscope_effects::Kind;
@@ -46,7 +46,7 @@ pub fn evidence(
         .map(|(j, joint)| {
             let measured = of_rows(&|s| s.tau[j].clone());
             let less = |rest: &[f64]| measured.iter().zip(rest).map(|(m, r)| m - r).collect();
-            TorqueSeries {
+            Series {
                 joint: joint.name.clone(),
                 unit: unit(j).into(),
                 time: time.clone(),
@@ -129,6 +129,7 @@ fn curves(
                 unit: if prismatic { "N" } else { "N m" }.into(),
                 data,
                 law,
+                band: Vec::new(),
             }
         })
         .collect()

@@ -476,7 +476,7 @@ pub struct LogEvaluation {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Evidence {
     /// One entry per joint, model order.
-    pub torque: Vec<TorqueSeries>,
+    pub torque: Vec<Series>,
     /// One entry per effect and joint, strongest effect first.
     pub curves: Vec<EffectCurve>,
     /// Gap of the corrected model on the same held-out data, in the form of `Diagnosis::gap`; `None` where no effect was found.
@@ -489,20 +489,20 @@ pub struct Evidence {
     pub corrected_file: String,
 }
 
-/// Measured and modelled torque of one joint over time, thinned for drawing; held-out fits.
+/// Measured and modelled quantity of one joint over time, thinned for drawing: torque, by held-out fits, or position.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct TorqueSeries {
+pub struct Series {
     /// Joint name.
     pub joint: String,
-    /// `N m` or `N`.
+    /// `N m` or `N`; of position `rad` or `m`.
     pub unit: String,
     /// Time over all episodes one after another, s.
     pub time: Vec<f64>,
-    /// Measured, band-limited.
+    /// Measured; torque is band-limited.
     pub measured: Vec<f64>,
     /// Nominal model.
     pub nominal: Vec<f64>,
-    /// Corrected model.
+    /// Corrected model; empty where there is none.
     pub corrected: Vec<f64>,
     /// Indices at which a new episode begins.
     pub breaks: Vec<usize>,
@@ -523,4 +523,6 @@ pub struct EffectCurve {
     pub data: Vec<[f64; 2]>,
     /// The fitted law, sorted by the horizontal value.
     pub law: Vec<[f64; 2]>,
+    /// Where the law lies within its parameters' intervals: horizontal value, least, greatest. Empty where it is not known.
+    pub band: Vec<[f64; 3]>,
 }

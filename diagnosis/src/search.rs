@@ -282,26 +282,24 @@ impl Logs<'_> {
     }
 
     /// What was chosen without the candidates of which every interval holds nothing: what blocks of time do not agree on was
-    /// not shown by them. Links stay, of which the URDF says what they may be. Where nothing of a kind is left, what else there is has its turn without it.
+    /// not shown by them. Links stay, of which the URDF says what they may be. Where nothing of a kind is left, what else there
+    /// is has its turn without it.
     fn shown(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let speeds = speeds(&self.signals, &self.band, self.model.dof());
         for kind in climb::kinds(&chosen.all, &chosen.choice.set) {
-            if kind == Kind::LinkInertiaError || kind.is_outside() {
-                continue;
-            }
-            let holds_nothing = |i: usize| {
-                let joints = &chosen.exact.entries[i].candidate.joints;
-                let half = chosen.fit.half_widths(&chosen.exact, joints, &speeds);
-                let (at, theta) = chosen.fit.own(&chosen.exact, i);
-                at.iter().zip(theta).all(|(&i, theta)| theta.abs() < half[i])
-            };
             // Candidates of a choice and entries at its exact law stand in one order.
             let of_kind = |i: usize| {
                 let candidate = &chosen.exact.entries[i].candidate;
-                candidate.kind == kind && !candidate.turns()
+                let is_link = kind.is_calibration() && candidate.link().is_some();
+                candidate.kind == kind && !candidate.turns() && !is_link && !kind.is_outside()
             };
             let own: Vec<usize> = (0..chosen.exact.entries.len()).filter(|&i| of_kind(i)).collect();
-            let gone: Vec<usize> = own.iter().copied().filter(|&i| holds_nothing(i)).collect();
+            let halves = chosen.fit.half_widths(&chosen.exact, &own, &speeds);
+            let holds_nothing = |(i, half): &(&usize, Vec<f64>)| {
+                let (_, theta) = chosen.fit.own(&chosen.exact, **i);
+                theta.iter().zip(half).all(|(theta, half)| theta.abs() < *half)
+            };
+            let gone: Vec<usize> = own.iter().zip(halves).filter(holds_nothing).map(|(&i, _)| i).collect();
             if gone.is_empty() {
                 continue;
             }

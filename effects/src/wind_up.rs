@@ -25,9 +25,6 @@ const WIND_UP: f64 = 0.025;
 /// Samples over which the rate of a spring is told as friction begins to hold its link.
 const SLOPE_OVER: usize = 4;
 
-/// Oscillators that are followed side by side.
-const LANES: usize = 8;
-
 /// What joins motor and link: torque k δ + d δ̇ beyond half the play on either side, and never a pull.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Coupling {
@@ -75,16 +72,17 @@ impl Coupling {
     }
 
     fn torque(&self, delta: f64, rate: f64) -> f64 {
-        let pressed = delta.signum() * (delta.abs() - self.half_gap).max(0.0);
-        if self.half_gap == 0.0 {
-            return self.stiffness * delta + self.damping * rate;
-        }
-        if pressed == 0.0 {
-            return 0.0;
-        }
-        let torque = self.stiffness * pressed + self.damping * rate;
-        if torque * pressed < 0.0 { 0.0 } else { torque }
+        passed(self.stiffness, self.damping, self.half_gap, delta, rate)
     }
+}
+
+/// Torque through a coupling at an angle and its rate. No path through it is longer than another, so that several go side by side.
+#[inline]
+fn passed(stiffness: f64, damping: f64, half_gap: f64, delta: f64, rate: f64) -> f64 {
+    let pressed = (delta.abs() - half_gap).max(0.0).copysign(delta);
+    let torque = stiffness * pressed + damping * rate;
+    // Play presses and never pulls.
+    if half_gap == 0.0 || torque * pressed > 0.0 { torque } else { 0.0 }
 }
 
 /// Wind-up δ = motor − link with its derivatives, sample by sample, rad, rad/s, rad/s² (m …).

@@ -5,11 +5,11 @@
 //! held against the bar of the search itself.
 
 use super::choice::MORE_THAN_NOISE;
-use super::{FILTERED, Rigid, SOFTEST, STIFFEST, Study, beyond_doubt, dot, mean, tells};
+use super::{FILTERED, Rigid, Runs, SOFTEST, STIFFEST, Study, beyond_doubt, dot, mean, tells};
 use crate::diagnose::Logs;
 use crate::estimate::Fit;
 use crate::problem::Problem;
-use gapscope_effects::{Candidate, EffectError, EncoderSide, JointRun, Kind};
+use gapscope_effects::{Candidate, EffectError, EncoderSide, Kind};
 use rayon::prelude::*;
 
 /// Gaps that are tried, rad or m, from the least on.
@@ -104,20 +104,20 @@ impl Study<'_> {
     /// Mean square of each block that a rigid drive with the best rotor would leave of a drive, beyond noise, (N m)².
     fn hidden(&self, drive: &Candidate, rotor: f64, rigid: &Rigid) -> Vec<f64> {
         let view = self.view(drive, rotor);
-        let difference = |runs: &[&JointRun]| -> Vec<f64> {
-            let mut own = self.rows_of(runs, view, |run| run.hidden_by(drive, rotor));
+        let difference = |of: Runs| -> Vec<f64> {
+            let mut own = self.at_rows(view, |e| self.run(of, e).hidden_by(drive, rotor));
             if drive.kind == Kind::Backlash {
                 // Its contact is a spring, with or without a gap.
                 let closed = Candidate { shape: 0.0, ..drive.clone() };
-                let contact = self.rows_of(runs, view, |run| run.hidden_by(&closed, rotor));
+                let contact = self.at_rows(view, |e| self.run(of, e).hidden_by(&closed, rotor));
                 own.iter_mut().zip(contact).for_each(|(own, contact)| *own -= contact);
             }
-            let heavier = self.rows_of(runs, view, |run| run.acceleration.clone());
+            let heavier = self.at_rows(view, |e| self.run(of, e).acceleration.clone());
             let part = dot(&own, &heavier) / dot(&heavier, &heavier).max(f64::MIN_POSITIVE);
             own.iter().zip(&heavier).map(|(own, heavier)| own - part * heavier).collect()
         };
-        let own = difference(&self.runs);
-        let noisier = difference(&self.noisier.iter().collect::<Vec<_>>());
+        let own = difference(Runs::Logged);
+        let noisier = difference(Runs::Noisier);
         let noise = self.mean_squares(noisier.iter().zip(&own).map(|(noisier, own)| noisier - own).collect());
         // Play is so sensitive that noise might account for all of it.
         let beyond = |((own, noise), rigid): ((&f64, &f64), &f64)| (own - noise.min(*rigid)).max(0.0);

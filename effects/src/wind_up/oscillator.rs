@@ -1,6 +1,6 @@
 //! An inertia on a coupling along a run; several are followed side by side.
 
-use super::{Coupling, Drag, LANES, SLOPE_OVER, WindUp, dot};
+use super::{Coupling, Drag, SLOPE_OVER, WindUp, dot, passed};
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
 
@@ -22,6 +22,9 @@ const BEYOND_DOUBT: f64 = 0.25;
 
 /// A coupling that is so soft, under a link that falls, that it runs away begins anew from here, rad (m).
 const LET_GO: f64 = 100.0;
+
+/// Oscillators that are followed side by side.
+const LANES: usize = 8;
 
 /// An inertia on a coupling along a run: I δ̈ = drive + f(q̇_m − δ̇) − slope δ − τ_l(δ, δ̇).
 ///
@@ -149,12 +152,11 @@ pub(super) type Begun<'a> = (Oscillator<'a>, (f64, f64), Option<&'a [f64]>);
 /// The wind-ups of oscillators that do not know of each other. Step waits for step in each, so that several side by side take
 /// hardly longer than one.
 pub(super) fn follow(all: &[Begun<'_>]) -> Vec<WindUp> {
-    let some = |some: &[Begun<'_>]| match some {
-        [] => Vec::new(),
-        [one] => together(&[*one]).into(),
-        few if few.len() <= 2 => padded::<2>(few),
-        few if few.len() <= 4 => padded::<4>(few),
-        many => padded::<LANES>(many),
+    let some = |some: &[Begun<'_>]| match some.len() {
+        1 => padded::<1>(some),
+        2 => padded::<2>(some),
+        3 | 4 => padded::<4>(some),
+        _ => padded::<LANES>(some),
     };
     all.chunks(LANES).flat_map(some).collect()
 }
@@ -208,19 +210,17 @@ fn together<const L: usize>(all: &[Begun<'_>; L]) -> [WindUp; L] {
                 (at.seen[l], at.seen_rises[l]) = (seen[k], after(seen));
                 at.pull[l] = -(-h[l] * own.coupling.pull(inertia)).exp_m1();
             }
-            let passed = own.coupling.torque(angle[l], rate[l]);
+            let held = own.coupling.torque(angle[l], rate[l]);
             out[l].angle.push(angle[l]);
             out[l].rate.push(rate[l]);
-            out[l].acceleration.push((now + friction[l] - at.slope[l] * angle[l] - passed) / inertia);
+            out[l].acceleration.push((now + friction[l] - at.slope[l] * angle[l] - held) / inertia);
         }
         let mut slip = [0.0; L];
         for i in 0..steps as usize {
             let part = (i as f64 + 0.5) / steps;
             for l in 0..L {
                 let drive = at.drive[l] + at.drive_rises[l] * part;
-                let pressed = (angle[l].abs() - half_gap[l]).max(0.0).copysign(angle[l]);
-                let torque = stiffness[l] * pressed + damping[l] * rate[l];
-                let passed = if half_gap[l] == 0.0 || torque * pressed > 0.0 { torque } else { 0.0 };
+                let passed = passed(stiffness[l], damping[l], half_gap[l], angle[l], rate[l]);
                 rate[l] += at.per_torque[l] * (drive - at.slope[l] * angle[l] - passed);
             }
             if rubs {

@@ -24,37 +24,10 @@ const STRETCHES: usize = 160;
 /// Dots of all curves together.
 const ALL_DOTS: usize = 40_000;
 
-/// The law of one effect at one joint.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Curve {
-    /// Public name of the effect.
-    pub kind: String,
-    /// Joint name.
-    pub joint: String,
-    /// Quantity on the horizontal axis with its unit, e.g. `speed, rad/s`.
-    pub x_label: String,
-    /// Unit of the torque on the vertical axis.
-    pub unit: String,
-    /// The data behind it, where logs hold torque.
-    pub data: Vec<[f64; 2]>,
-    /// The fitted law, sorted by the horizontal value.
-    pub law: Vec<[f64; 2]>,
-    /// Where the law lies within its parameters' intervals: horizontal value, least, greatest. Empty where it is not known.
-    pub band: Vec<[f64; 3]>,
-}
-
-impl From<&EffectCurve> for Curve {
-    fn from(curve: &EffectCurve) -> Curve {
-        let EffectCurve { kind, joint, x_label, unit, data, law } = curve.clone();
-        let unit = if unit.is_empty() { "N m".into() } else { unit };
-        Curve { kind, joint, x_label, unit, data, law: smooth(&law), band: vec![] }
-    }
-}
-
 /// The laws of a diagnosis, each with a band where it is known.
-pub fn of(evidence: &Evidence, effects: &[FoundEffect]) -> Vec<Curve> {
+pub fn of(evidence: &Evidence, effects: &[FoundEffect]) -> Vec<EffectCurve> {
     let with_band = |drawn: &EffectCurve| {
-        let mut curve = Curve::from(drawn);
+        let mut curve = EffectCurve { law: smooth(&drawn.law), ..drawn.clone() };
         if let Some(ends) = ends(effects, &curve.kind, &curve.joint) {
             let at = |[x, y]: [f64; 2]| {
                 let [a, b] = ends.map(|end| end * y);
@@ -82,14 +55,15 @@ fn ends(effects: &[FoundEffect], kind: &str, joint: &str) -> Option<[f64; 2]> {
 }
 
 /// Small multiples, the most important first, or `none` where there are none. `joints` are in the robot's order.
-pub fn render(curves: &[Curve], joints: &[String], none: &str) -> Markup {
-    let drawn: Vec<&Curve> = curves.iter().filter(|c| !c.law.is_empty() || !c.data.is_empty()).collect();
+pub fn render(curves: &[EffectCurve], joints: &[String], none: &str) -> Markup {
+    let drawn: Vec<&EffectCurve> = curves.iter().filter(|c| !c.law.is_empty() || !c.data.is_empty()).collect();
     if drawn.is_empty() {
         return html! { p.muted { (none) } };
     }
     let most = (ALL_DOTS / drawn.len()).clamp(50, DOTS);
     let chosen = choose(&drawn, joints);
-    let folded: Vec<&Curve> = drawn.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).map(|(_, c)| *c).collect();
+    let folded: Vec<&EffectCurve> =
+        drawn.iter().enumerate().filter(|(i, _)| !chosen.contains(i)).map(|(_, c)| *c).collect();
     html! {
         p.legend {
             @if drawn.iter().any(|c| !c.data.is_empty()) {
@@ -108,7 +82,7 @@ pub fn render(curves: &[Curve], joints: &[String], none: &str) -> Markup {
     }
 }
 
-fn curve(curve: &Curve, most: usize) -> Markup {
+fn curve(curve: &EffectCurve, most: usize) -> Markup {
     let unit = &curve.unit;
     let stride = curve.data.len().div_ceil(most).max(1);
     let data: Vec<[f64; 2]> = curve.data.iter().copied().step_by(stride).collect();
@@ -167,7 +141,7 @@ fn bulk(data: &[[f64; 2]]) -> Vec<f64> {
 }
 
 /// Indices of the curves shown at once, in order: effects take turns, each with its largest law first.
-fn choose(curves: &[&Curve], joints: &[String]) -> Vec<usize> {
+fn choose(curves: &[&EffectCurve], joints: &[String]) -> Vec<usize> {
     let span = |i: &usize| {
         let values = curves[*i].law.iter().map(|p| p[1]).filter(|v| v.is_finite());
         let (from, to) = values.fold((0.0, 0.0), |(a, b): (f64, f64), v| (a.min(v), b.max(v)));

@@ -1,7 +1,7 @@
 //! What a page holds a model to: each joint's gap and its lines over time, whether of torque or of position.
 
 use super::words;
-use gapscope_diagnosis::schema::{Diagnosis, Evidence, TorqueGap, TorqueSeries};
+use gapscope_diagnosis::schema::{Diagnosis, Evidence, Series, TorqueGap};
 
 /// The gap of a robot.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,33 +44,6 @@ pub struct Figure {
     pub ci95: Option<[f64; 2]>,
 }
 
-/// Measured and modelled quantity of one joint over time.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Series {
-    /// Joint name.
-    pub joint: String,
-    /// Unit of the lines.
-    pub unit: String,
-    /// Time over all episodes one after another, s.
-    pub time: Vec<f64>,
-    /// Measured.
-    pub measured: Vec<f64>,
-    /// Model before the corrections.
-    pub nominal: Vec<f64>,
-    /// Model after them; empty where there is none.
-    pub corrected: Vec<f64>,
-    /// Indices at which a new episode begins.
-    pub breaks: Vec<usize>,
-}
-
-impl From<&TorqueSeries> for Series {
-    fn from(torque: &TorqueSeries) -> Series {
-        let TorqueSeries { joint, unit, time, measured, nominal, corrected, breaks } = torque.clone();
-        let unit = if unit.is_empty() { "N m".into() } else { unit };
-        Series { joint, unit, time, measured, nominal, corrected, breaks }
-    }
-}
-
 impl JointGap {
     /// Whether the interval of the gap lies above the noise floor.
     pub fn is_above_floor(&self) -> bool {
@@ -99,7 +72,7 @@ impl Gauge {
             corrected: "model with the effects",
             robot: diagnosis.robot.clone(),
             joints: diagnosis.joints.iter().map(joint).collect(),
-            series: evidence.torque.iter().filter(|s| !s.time.is_empty()).map(Series::from).collect(),
+            series: evidence.torque.iter().filter(|s| !s.time.is_empty()).cloned().collect(),
         }
     }
 

@@ -3,11 +3,11 @@
 use super::axis::Axis;
 use super::chart::{Plot, band, envelope, line};
 use super::format::{count, figure, with_unit};
-use super::gauge::{Gauge, JointGap, Series};
+use super::gauge::{Gauge, JointGap};
 use super::packed::{self, Packed};
 use super::words;
 use crate::picture::{Panel, Series as Line, panels};
-use gapscope_diagnosis::schema::Evidence;
+use gapscope_diagnosis::schema::{Evidence, Series};
 use maud::{Markup, html};
 use serde::Serialize;
 
@@ -29,7 +29,7 @@ const THIN: usize = 240;
 /// its own; `None` where the evidence holds no torque.
 pub fn picture(title: &str, evidence: &Evidence) -> Option<String> {
     let drawn = evidence.torque.iter().filter(|s| s.time.len() > 1);
-    let panels_of: Vec<Panel> = drawn.flat_map(|series| stretch(&Series::from(series))).collect();
+    let panels_of: Vec<Panel> = drawn.flat_map(stretch).collect();
     (!panels_of.is_empty()).then(|| panels(title, &panels_of))
 }
 

@@ -4,13 +4,13 @@ mod answer;
 mod schema;
 
 use super::format::{self, percent, percent_interval, with_unit};
-use super::gauge::{Figure, Gauge, JointGap, Series};
+use super::gauge::{Figure, Gauge, JointGap};
 use super::scene::Scene;
 use super::{Top, curves, effects, heatmap, joints, reproduce, rest, section, series, setting, why, words};
 use crate::input::Loaded;
 use gapscope_datasets::{Doubt, Episode, Fault};
 use gapscope_diagnosis::Origin;
-use gapscope_diagnosis::schema::Verdict;
+use gapscope_diagnosis::schema::{Series, Verdict};
 use gapscope_dynamics::{JointKind, Model};
 use gapscope_servo::schema::{Diagnosis, Estimate, FoundDrive};
 use gapscope_servo::{Evidence, Outcome, Signal};

@@ -163,7 +163,7 @@ pub fn shrink(before: f64, after: f64) -> Shrink {
 }
 
 /// Torque of the joints over four episodes of ten seconds.
-pub fn torque(names: &[String], unit: &str, samples: usize) -> Vec<TorqueSeries> {
+pub fn torque(names: &[String], unit: &str, samples: usize) -> Vec<Series> {
     let series = |(j, joint): (usize, &String)| {
         let time: Vec<f64> = (0..samples).map(|i| 40.0 * i as f64 / samples as f64).collect();
         let size = 30.0 / (1.0 + j as f64);
@@ -180,7 +180,7 @@ pub fn torque(names: &[String], unit: &str, samples: usize) -> Vec<TorqueSeries>
             .map(|(t, v)| v - 0.06 * size * (0.9 * t + j as f64).cos().signum() - 0.03 * size)
             .collect();
         let measured = corrected.iter().enumerate().map(|(i, v)| v + 0.006 * size * noise(i)).collect();
-        TorqueSeries {
+        Series {
             joint: joint.clone(),
             unit: unit.into(),
             time,
@@ -205,5 +205,6 @@ pub fn curve(kind: &str, joint: &str, x_label: &str, law: impl Fn(f64) -> f64, s
             .map(|(i, h)| [h, law(h) + spread * noise(3 * i + 1) * noise(5 * i)])
             .collect(),
         law: (0..201).map(|i| [x(i, 201), law(x(i, 201))]).collect(),
+        band: vec![],
     }
 }

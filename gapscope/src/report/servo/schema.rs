@@ -1,8 +1,7 @@
 //! The diagnosis of a servo arm in the terms that the parts of the page share with one of torque.
 
-use super::super::curves::Curve;
 use gapscope_diagnosis::schema::{
-    Bounds, EffectShrink, Estimate, FoundEffect, Parameter, Part, Quantity, Regime, Verdict, Why,
+    Bounds, EffectCurve, EffectShrink, Estimate, FoundEffect, Parameter, Part, Quantity, Regime, Verdict, Why,
 };
 use gapscope_servo::schema as servo;
 use std::collections::BTreeMap;
@@ -75,14 +74,14 @@ pub fn why(list: &[servo::Why]) -> Vec<Why> {
 }
 
 /// Friction over speed, up to a joint's own `speeds`, rad/s. What hangs on something else has its figures alone.
-pub fn curves(list: &[servo::FoundEffect], speeds: &BTreeMap<String, f64>) -> Vec<Curve> {
-    let of = |effect: &servo::FoundEffect| -> Vec<Curve> {
+pub fn curves(list: &[servo::FoundEffect], speeds: &BTreeMap<String, f64>) -> Vec<EffectCurve> {
+    let of = |effect: &servo::FoundEffect| -> Vec<EffectCurve> {
         effect.joints.iter().filter_map(|joint| curve(effect, joint, *speeds.get(joint)?)).collect()
     };
     list.iter().flat_map(of).collect()
 }
 
-fn curve(effect: &servo::FoundEffect, joint: &str, top: f64) -> Option<Curve> {
+fn curve(effect: &servo::FoundEffect, joint: &str, top: f64) -> Option<EffectCurve> {
     let names: &[&str] = match effect.kind.as_str() {
         "coulomb_friction" => &["coulomb"],
         "viscous_friction" => &["viscous"],
@@ -116,7 +115,7 @@ fn curve(effect: &servo::FoundEffect, joint: &str, top: f64) -> Option<Curve> {
     });
     let unit = found.first().map_or("", |e| e.unit.as_str());
     let unit = if effect.kind == "viscous_friction" { unit.replacen("N m s/rad", "N m", 1) } else { unit.to_owned() };
-    Some(Curve {
+    Some(EffectCurve {
         kind: effect.kind.clone(),
         joint: joint.to_owned(),
         x_label: "speed, rad/s".into(),

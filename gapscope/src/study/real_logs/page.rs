@@ -7,7 +7,7 @@ use crate::report::{
     with_unit,
 };
 use gapscope_diagnosis::Outcome;
-use gapscope_diagnosis::schema::{Change, Diagnosis, Estimate, FoundEffect, Parameter, Quantity, TorqueSeries};
+use gapscope_diagnosis::schema::{Change, Diagnosis, Estimate, FoundEffect, Parameter, Quantity, Series};
 use std::fmt::Write;
 
 /// Regimes listed of what is left.
@@ -70,7 +70,7 @@ pub fn markdown(log: &Log, outcome: &Outcome, others: &[Other], pictures: [Optio
 }
 
 /// What the models explain of each joint's effort, beside what another program does.
-fn explained(known: &KnownFit, torque: &[TorqueSeries]) -> String {
+fn explained(known: &KnownFit, torque: &[Series]) -> String {
     let mut text = format!(
         "## What is explained of each joint’s torque\n\nR², 1 − squares left over squares about the mean. Figures here are of what was held out of \
          each fit, those of another program of all of the log. Its corrected model has {}.\n\n\
@@ -243,11 +243,11 @@ mod tests {
 
     #[test]
     fn what_another_program_explains_stands_beside() {
-        let series = |joint: &str, model: f64| TorqueSeries {
+        let series = |joint: &str, model: f64| Series {
             joint: joint.into(),
             measured: vec![0.0, 2.0],
             nominal: vec![model; 2],
-            ..TorqueSeries::default()
+            ..Series::default()
         };
         let known = KnownFit { nominal: &[0.5, -9.0], corrected: &[0.9, 0.8], with: "all" };
         let text = explained(&known, &[series("a", 1.0), series("b", 2.0)]);

@@ -58,3 +58,20 @@ fn without_a_corrected_model_there_is_a_gap_and_no_shrink() {
 }
 
 // The public JSON.
+
+#[test]
+fn what_predicts_held_out_data_worse_is_in_neither_answer_nor_corrected_model() {
+    let model = robot("arm6");
+    let mut outcome = found(&model, &with_payload());
+    assert!(!outcome.corrected.effects.is_empty() && !outcome.diagnosis.combinations.is_empty());
+    outcome.diagnosis.shrink.torque.ci95 = Some([-0.5, -0.1]);
+    outcome.within_physics(&model);
+    let diagnosis = &outcome.diagnosis;
+    assert!(diagnosis.effects.is_empty() && outcome.corrected.effects.is_empty());
+    assert!(diagnosis.combinations.is_empty() && diagnosis.covariance.is_none());
+    assert_eq!(diagnosis.verdict, Verdict::UnknownEffect);
+    let changes = diagnosis.shrink.rollout.iter().map(|at| &at.change);
+    for change in changes.chain([&diagnosis.shrink.torque, &diagnosis.shrink.one_step]) {
+        assert_eq!((change.after, change.ci95), (change.before, None));
+    }
+}

@@ -323,6 +323,27 @@ pub(crate) fn inertia_about(model: &Model, data: &mut Data, motion: &Motion, joi
 mod tests {
     use super::*;
 
+    /// A light link dragged at one speed: what its coupling passes on is both frictions, however much one step of time slows it.
+    #[test]
+    fn a_link_that_is_dragged_takes_both_of_its_frictions() {
+        let samples = 2000;
+        let drag = Drag {
+            speed: vec![0.5; samples],
+            dry: vec![1.9; samples],
+            viscous: 1.6,
+            taken: vec![0.0; samples],
+            holds: vec![false; samples],
+        };
+        let (idle, inertia) = (vec![0.0; samples], vec![0.006; samples]);
+        for half_gap in [0.0, 0.01] {
+            let coupling = Coupling { half_gap, ..Coupling::resonant(0.006, 20.0, 0.05) };
+            let link =
+                Oscillator { drive: &idle, inertia: &inertia, slope: None, drag: Some(&drag), coupling, dt: 5e-3 };
+            let passed = link.wind_up(None).torque(&coupling)[samples - 1];
+            assert!((passed.abs() - (1.9 + 1.6 * 0.5)).abs() < 1e-3, "{passed}");
+        }
+    }
+
     #[test]
     fn oscillators_side_by_side_do_what_each_does_alone() {
         let samples = 400;

@@ -227,8 +227,8 @@ fn together<const L: usize>(all: &[Begun<'_>; L]) -> [WindUp; L] {
                 for l in 0..L {
                     let motor = at.motor[l] + at.motor_rises[l] * part - drawn[l];
                     let free = motor - rate[l];
-                    let wet = free * at.wet[l];
-                    let link = wet - wet.max(-at.hold[l]).min(at.hold[l]);
+                    // Both frictions at the speed that comes of them: what the dry one leaves, the wet one slows.
+                    let link = (free - free.max(-at.hold[l]).min(at.hold[l])) * at.wet[l];
                     slip[l] = free - link;
                     rate[l] = motor - link;
                 }

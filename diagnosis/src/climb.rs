@@ -220,14 +220,16 @@ impl<'a> Competition<'a> {
         }
     }
 
-    /// A set without the kinds that move no joint by as much as concerns anyone.
+    /// A set without the kinds that move no joint by as much as concerns anyone, and in whose stead no other has to be what it
+    /// hardly can: a last link could take over any payload, had it no mass of its own.
     fn material(&self, mut set: Vec<usize>) -> Vec<usize> {
-        let Some((score, _)) = self.problem.score().settle(&self.problem.columns(&set)) else { return set };
-        let Some(with) = score.left(&self.problem.columns(&set)) else { return set };
+        let Some((score, with)) = self.problem.score().settle(&self.problem.columns(&set)) else { return set };
+        let left = score.left_by(&with);
         for kind in kinds(self.problem, &set) {
             let rest = self.without(&set, |c| self.kind(c) == kind);
-            let Some(without) = score.left(&self.problem.columns(&rest)) else { continue };
-            if !is_material(self.problem, &without, &with) {
+            let Some(without) = score.solve(&self.problem.columns(&rest)) else { continue };
+            let moves = is_material(self.problem, &score.left_by(&without), &left);
+            if !moves && without.far() - with.far() < MISSED {
                 set = rest;
             }
         }

@@ -20,6 +20,13 @@ const BANDS: usize = EDGES.len() - 1;
 /// Part of its noise that a second run has once more: so little that play hits its stops as it did.
 pub(crate) const PART_OF_NOISE: f64 = 0.3;
 
+/// Part of what is left by which the effort is touched to see whether an account feels it: so little that no contact changes.
+const TOUCH: f64 = 1e-4;
+/// Part of a touch that is felt at least where an account predicts the effort.
+const FELT: f64 = 0.05;
+/// Rows to either side over which that is looked at.
+const NEAR: usize = 1;
+
 /// What a law makes of noise is known to this part: how much of it is the position's and how much the effort's, how white.
 const KNOWN_TO: f64 = 0.15;
 
@@ -66,7 +73,13 @@ impl Logs<'_> {
         }
         let through = |i: usize| -> Result<Vec<[f64; BANDS]>, EffectError> {
             let noisier = run(accounts[i].0, &noisier)?;
-            Ok((0..n).map(|j| self.levels(&less(&noisier[j], &plain[i][j]))).collect())
+            let of = |j: usize| {
+                let moved = self.levels(&less(&noisier[j], &plain[i][j]));
+                let left = [0, 1].map(|i: usize| self.levels(&plain[i][j]));
+                // Two runs of a play that hits its stops at other times differ by more than either leaves: that is no noise.
+                std::array::from_fn(|b| moved[b].min(left[0][b].max(left[1][b]) + PART_OF_NOISE.ln()))
+            };
+            Ok((0..n).map(of).collect())
         };
         let through = [through(0)?, through(1)?];
         let filters = [0, 1].map(|i: usize| accounts[i].0.filters_beyond(accounts[1 - i].0));
@@ -84,13 +97,45 @@ impl Logs<'_> {
         Ok([scale(0), scale(1)])
     }
 
+    /// Rows at which what an account leaves does not hang on the effort, `[joint][row]`: behind a link whose play is open the
+    /// rotor flies as it is driven, and the account predicts no effort there.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub(crate) fn unpredicted(&self, chosen: &Chosen, rest: &Rest) -> Result<Vec<Vec<bool>>, EffectError> {
+        let rows = |rest: &Rest, j: usize| self.sliding_rows(j, rest);
+        let mut moved: Vec<Signals> = self.signals.clone();
+        for (s, rest) in moved.iter_mut().zip(rest) {
+            for (tau, rest) in s.tau.iter_mut().zip(rest) {
+                tau.iter_mut().zip(rest.iter().rev()).for_each(|(tau, rest)| *tau += TOUCH * rest);
+            }
+        }
+        let of = |j: usize, then: &Rest| {
+            let touched: Rest =
+                moved.iter().zip(&self.signals).map(|(then, now)| vec![less(&then.tau[j], &now.tau[j])]).collect();
+            let touched = self.sliding_rows_of(j, &touched, 0);
+            let felt = less(&rows(then, j), &rows(rest, j));
+            let near = |x: &[f64], i: usize| -> f64 {
+                x[i.saturating_sub(NEAR)..(i + NEAR + 1).min(x.len())].iter().map(|x| x * x).sum()
+            };
+            (0..felt.len()).map(|i| near(&felt, i) < FELT * FELT * near(&touched, i)).collect()
+        };
+        let then = Data { signals: &moved, ..self.data(&chosen.noise) }.rest(&chosen.exact, &chosen.fit)?;
+        Ok((0..self.model.dof()).map(|j| of(j, &then)).collect())
+    }
+
     /// What is left of a joint at all rows, nothing where it rests.
     fn sliding_rows(&self, joint: usize, rest: &Rest) -> Vec<f64> {
+        self.sliding_rows_of(joint, rest, joint)
+    }
+
+    /// The same of a signal in some place.
+    fn sliding_rows_of(&self, joint: usize, signals: &Rest, place: usize) -> Vec<f64> {
         let of = |(e, (s, rest)): (usize, (&Signals, &Vec<Vec<f64>>))| {
-            let rows = self.band.filter_where(e, &s.slides(joint, self.still[joint]), &rest[joint]);
+            let rows = self.band.filter_where(e, &s.slides(joint, self.still[joint]), &rest[place]);
             rows.into_iter().map(|row| row.unwrap_or(0.0)).collect::<Vec<_>>()
         };
-        self.signals.iter().zip(rest).enumerate().flat_map(of).collect()
+        self.signals.iter().zip(signals).enumerate().flat_map(of).collect()
     }
 
     /// Mean logarithm over blocks of time of the size of a signal at all rows, in each band of frequencies.

@@ -73,12 +73,18 @@ impl Chosen {
         // What is left of the better account is nearer to noise: it says how many rows of a rest count as one.
         let counts: Vec<f64> =
             self.exact.correlation().iter().zip(other.exact.correlation()).map(|(a, b)| a.min(*b)).collect();
-        let evidence = |of: &Chosen, i: usize| of.exact.evidence(&of.fit, at(i), &logs.band);
+        let open = match filtered {
+            true => Some([logs.unpredicted(self, &own)?, logs.unpredicted(other, &others)?]),
+            false => None,
+        };
+        let unpredicted = |i: usize| open.as_ref().map(|both| both[i].as_slice());
+        let evidence = |of: &Chosen, i: usize| of.exact.evidence(&of.fit, at(i), unpredicted(i), &logs.band);
         let (mut evidence, mut others_evidence) = (evidence(self, 0), evidence(other, 1));
-        let least: Vec<f64> =
-            evidence.noise.iter().zip(&others_evidence.noise).map(|(own, other)| own.min(*other)).collect();
-        evidence.at_rest(&logs.borne(&own), &least, &counts, &logs.band);
-        others_evidence.at_rest(&logs.borne(&others), &least, &counts, &logs.band);
+        // What a law filters out of the noise at rest says nothing for it.
+        let bar = |(own, other): (&f64, &f64)| if filtered { own.max(*other) } else { own.min(*other) };
+        let bar: Vec<f64> = evidence.noise.iter().zip(&others_evidence.noise).map(bar).collect();
+        evidence.at_rest(&logs.borne(&own), &bar, &counts, &logs.band);
+        others_evidence.at_rest(&logs.borne(&others), &bar, &counts, &logs.band);
         Ok(evidence.against(&others_evidence) + self.prior() - other.prior())
     }
 

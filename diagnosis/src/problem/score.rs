@@ -138,6 +138,11 @@ impl Solved {
         self.nats - self.occam
     }
 
+    /// Nats that coefficients cost by how far they lie from nothing, in units of their spreads.
+    pub fn far(&self) -> f64 {
+        0.5 * (self.theta.norm_squared() + self.held.iter().map(|(_, theta)| theta * theta).sum::<f64>())
+    }
+
     /// Columns whose coefficients came to nothing at a bound.
     pub fn at_nothing(&self) -> impl Iterator<Item = usize> {
         self.held.iter().filter(|(_, theta)| *theta == 0.0).map(|(c, _)| *c)
@@ -178,7 +183,15 @@ impl Problem {
     /// What logs say for an account at its exact law, as good as the whole problem is linear about it (Laplace). What is left
     /// has heavy tails, so that neither a glitch nor a blow decides, and a level of its own in each band of frequencies
     /// (Whittle, Arkiv för Matematik 2(23) 1953): noise at some of them does not drown what the others say.
-    pub fn evidence(&self, fit: &Fit, equalizer: Option<&Equalizer>, band: &Band) -> Evidence {
+    ///
+    /// Of `unpredicted` rows (`[joint][row]`) an account knows no more than the size of the effort.
+    pub fn evidence(
+        &self,
+        fit: &Fit,
+        equalizer: Option<&Equalizer>,
+        unpredicted: Option<&[Vec<bool>]>,
+        band: &Band,
+    ) -> Evidence {
         let folds = Fit::without_folds(self, &fit.set);
         let blocks = vec![0.0; band.blocks];
         let noise = vec![1.0; self.joints.len()];
@@ -186,11 +199,18 @@ impl Problem {
         for (j, joint) in self.joints.iter().enumerate().filter(|(_, joint)| !joint.rows.is_empty()) {
             let inexact: Vec<f64> = joint.linear_target.iter().map(|x| (INEXACT * x).powi(2)).collect();
             let least = self.least_noise(j);
+            let open = |i: usize| unpredicted.is_some_and(|rows| rows[j][joint.rows[i]]);
+            let told: Vec<usize> = (0..joint.rows.len()).filter(|&i| !open(i)).collect();
             let nats = |rest: Vec<f64>| -> Vec<f64> {
                 let mut nats = vec![0.0; rest.len()];
                 for (part, width) in joint.in_bands(band, j, rest, equalizer) {
-                    let inexact: Vec<f64> = inexact.iter().map(|x| x * width).collect();
-                    let (_, own) = heavy_tailed(&part, &inexact, least * width);
+                    let inexact: Vec<f64> = told.iter().map(|&i| inexact[i] * width).collect();
+                    let part: Vec<f64> = told.iter().map(|&i| part[i]).collect();
+                    let mut own = vec![-(self.scale[j] * width.sqrt()).ln(); nats.len()];
+                    if !told.is_empty() {
+                        let (_, density) = heavy_tailed(&part, &inexact, least * width);
+                        told.iter().zip(density).for_each(|(&i, density)| own[i] = density);
+                    }
                     // So many of the rows of a band are independent.
                     nats.iter_mut().zip(own).for_each(|(nats, own)| *nats += own * width);
                 }
@@ -303,7 +323,7 @@ impl<'a> Score<'a> {
         let mut noise = self.noise.clone();
         let mut solved = self.solve(columns)?;
         for _ in 0..NOISE_STEPS {
-            let next = self.noise_of(&solved);
+            let next = self.left_by(&solved);
             let change = next.iter().zip(&noise).map(|(a, b)| (a / b).ln().abs()).fold(0.0, f64::max);
             noise = next;
             solved = self.at_some(noise.clone(), &|c| own[c]).solve(columns)?;
@@ -314,13 +334,8 @@ impl<'a> Score<'a> {
         Some((self.at(noise), solved))
     }
 
-    /// Mean square that a set leaves of each joint, (N m)² or N².
-    pub fn left(&self, columns: &[usize]) -> Option<Vec<f64>> {
-        Some(self.noise_of(&self.solve(columns)?))
-    }
-
     /// Mean square that a solved set leaves of each joint, what its coefficients may still be off by included.
-    fn noise_of(&self, solved: &Solved) -> Vec<f64> {
+    pub fn left_by(&self, solved: &Solved) -> Vec<f64> {
         let problem = self.problem;
         let covariance = solved.factor.inverse();
         let mut place = vec![usize::MAX; self.spread.len()];

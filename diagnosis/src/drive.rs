@@ -264,6 +264,7 @@ impl<'a> Study<'a> {
             }
         }
         let (_, drive, rotor) = best?;
+        let drive = Candidate { rotor, ..drive };
         let rigid = self.against(&drive, rotor);
         let beyond = beyond_doubt(&rigid, &self.left(&drive, rotor, &rigid))?;
         // At the edge of what a drive can be, it stands in for something else.

@@ -119,6 +119,31 @@ impl Fit {
             .unzip()
     }
 
+    /// The alignment's coefficient and those of each candidate of a problem, tangents of knobs aside.
+    pub fn coefficients(&self, problem: &Problem) -> Vec<Vec<f64>> {
+        let own = |c: usize| {
+            let entry = &problem.entries[c];
+            let mut theta = self.own(problem, c).1;
+            theta.truncate(entry.columns.len() - usize::from(entry.tangent));
+            theta
+        };
+        std::iter::once(vec![self.alignment()]).chain((0..problem.entries.len()).map(own)).collect()
+    }
+
+    /// Moves the coefficients to others of the same candidates, by a part of the way. Tangents of knobs stay out.
+    pub fn move_to(&mut self, problem: &Problem, others: &[Vec<f64>], part: f64) {
+        let to = |own: &mut f64, other: f64| *own += part * (other - *own);
+        if self.columns.first() == Some(&0) {
+            to(&mut self.theta[0], others[0][0]);
+        }
+        for (c, others) in others[1..].iter().enumerate() {
+            let (at, _) = self.own(problem, c);
+            for (i, place) in at.into_iter().enumerate() {
+                to(&mut self.theta[place], others.get(i).copied().unwrap_or(0.0));
+            }
+        }
+    }
+
     /// The effects, one a kind where the kind has a value per joint. Candidates whose coefficients no physical effect has are
     /// left out. Links may be what no body is: where a search moves on from here, a body that was moved would lead it astray.
     pub fn effects(&self, problem: &Problem, model: &Model) -> Vec<Effect> {

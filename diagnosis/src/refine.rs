@@ -26,6 +26,12 @@ const BENT: [Kind; 7] = [
 ];
 /// Relative change of a knob at which it has settled.
 const SETTLED: f64 = 2e-3;
+/// Rounds, at most, where a drive turns on its own: friction behind it comes nearer by a part of the way each time.
+const ROUNDS_OF_TURNING: usize = 20;
+/// Fall of the misfit, see [`Problem::misfit`], at which such an account has settled: half a nat.
+const SETTLED_MISFIT: f64 = 1.0;
+/// Times that a step which leaves more than the one before is halved.
+const HALVINGS: usize = 3;
 /// Least and greatest of a knob over where it began: beyond them it is another law.
 const KNOB: (f64, f64) = (0.2, 5.0);
 /// The same for a limit: far below where it is reached it would cut away what it is to explain.
@@ -51,6 +57,7 @@ pub struct Data<'a> {
 }
 
 /// What the effects of a fit change of the residual, and the coefficients of the columns that stand for it.
+#[derive(Default)]
 pub struct Bend {
     /// `[episode][joint][signal]`, N m or N.
     change: Vec<Vec<Vec<f64>>>,
@@ -58,7 +65,30 @@ pub struct Bend {
     theta: Vec<Vec<f64>>,
 }
 
+/// The best point that a refinement came to.
+struct Reached {
+    /// What the plant leaves there, see [`Problem::misfit`].
+    misfit: f64,
+    /// See [`Fit::coefficients`].
+    coefficients: Vec<Vec<f64>>,
+}
+
 impl Data<'_> {
+    /// A problem of some terms, bent by what was found and weighed by what is left there. Before anything was found, a drive
+    /// that turns on its own has the rotor that its account begins with: by the signature of a rigid one it would be any.
+    fn about(&self, terms: Vec<Term>, found: Option<&Bend>) -> Problem {
+        let mut problem = self.problem(terms, &Kind::ALL);
+        let set: Vec<usize> = (0..problem.entries.len()).collect();
+        match found {
+            Some(found) => {
+                self.bent(&mut problem, &set, found);
+                problem.weigh(self.band, &set);
+            }
+            None => problem.begin_with_rotors(),
+        }
+        problem
+    }
+
     /// A problem of some terms, weighed by what all those of some kinds leave.
     pub fn problem(&self, terms: Vec<Term>, weighed_by: &[Kind]) -> Problem {
         let mut problem =
@@ -164,15 +194,16 @@ impl Data<'_> {
         let bends = candidates.iter().any(|c| BENT.contains(&c.kind));
         let least = if bends { ROUNDS_FOR_BENT } else { 1 };
         let loads = candidates.iter().any(Candidate::reads_torque);
+        let turns = candidates.iter().any(Candidate::turns);
+        let most = if turns { ROUNDS_OF_TURNING } else { ROUNDS };
+        let mut settled = !turns;
+        let mut reached: Option<Reached> = None;
         let mut loaded: Option<Vec<Signals>> = None;
         let mut round = 0;
         loop {
             let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
-            let mut problem = data.problem(terms.clone(), &Kind::ALL);
-            if let Some(found) = &found {
-                data.bent(&mut problem, &set, found);
-            }
-            let fit = Fit::on_all(&problem, &set);
+            let problem = data.about(terms.clone(), found.as_ref());
+            let mut fit = Fit::on_all(&problem, &set);
             let mut change = 0.0f64;
             for (i, term) in terms.iter_mut().enumerate() {
                 let (_, theta) = fit.own(&problem, i);
@@ -195,26 +226,70 @@ impl Data<'_> {
                     }
                 }
             }
-            if round >= ROUNDS || (round >= least && change < SETTLED) {
+            if round >= most || (round >= least && change < SETTLED && settled) {
+                let mut problem = problem;
+                if let Some(last) = &reached {
+                    let mut there = problem.clone();
+                    data.bent(&mut there, &set, &data.bend(&problem, &fit)?);
+                    if there.misfit(&fit, self.band) > last.misfit {
+                        fit.move_to(&problem, &last.coefficients, 1.0);
+                    }
+                }
                 data.break_away(&mut problem, &fit)?;
                 problem.split(self.band);
                 return Ok((problem, fit));
             }
-            let mut at = fit.clone();
+            let (mut problem, mut at) = (problem, fit.clone());
             if change > 0.0 {
                 // Curvature belongs to the knobs as they will be.
-                problem =
-                    data.problem(terms.iter().map(|t| Term { tangent_at: None, ..t.clone() }).collect(), &Kind::ALL);
-                if let Some(found) = &found {
-                    data.bent(&mut problem, &set, found);
-                }
+                let plain = terms.iter().map(|t| Term { tangent_at: None, ..t.clone() }).collect();
+                problem = data.about(plain, found.as_ref());
                 at = Fit::on_all(&problem, &set);
             }
             if loads {
                 loaded = Some(self.loaded(&problem, &at)?);
             }
             let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
-            found = Some(data.bend(&problem, &at)?);
+            let mut bend = Bend::default();
+            if turns {
+                // What turns on its own bends so much that a whole step may lead away, or fall far short.
+                let mut there = problem.clone();
+                let mut look = |at: &Fit| -> Result<(Bend, f64), EffectError> {
+                    let bend = data.bend(&problem, at)?;
+                    data.bent(&mut there, &set, &bend);
+                    Ok((bend, there.misfit(at, self.band)))
+                };
+                let (mut here, mut misfit) = look(&at)?;
+                if let Some(last) = &reached {
+                    let mut farther = at.clone();
+                    farther.move_to(&problem, &last.coefficients, -1.0);
+                    if misfit < last.misfit {
+                        let (bend, left) = look(&farther)?;
+                        if left < misfit {
+                            (at, here, misfit) = (farther, bend, left);
+                        }
+                    }
+                    for _ in 0..HALVINGS {
+                        if misfit <= last.misfit {
+                            break;
+                        }
+                        at.move_to(&problem, &last.coefficients, 0.5);
+                        (here, misfit) = look(&at)?;
+                    }
+                    settled = last.misfit - misfit < SETTLED_MISFIT;
+                }
+                if settled && reached.as_ref().is_some_and(|last| misfit > last.misfit) {
+                    // No way down from where it is.
+                    round = ROUNDS_OF_TURNING;
+                    continue;
+                }
+                bend = here;
+                reached = Some(Reached { misfit, coefficients: at.coefficients(&problem) });
+            }
+            if !turns {
+                bend = data.bend(&problem, &at)?;
+            }
+            found = Some(bend);
             round += 1;
         }
     }

@@ -59,6 +59,8 @@ pub struct Candidate {
     pub shape: f64,
     /// Inertia of the link about the joint in the logs, kg m² (kg), for elasticity.
     pub inertia: f64,
+    /// Inertia of the rotor that an account of an elasticity or a play begins with, kg m² (kg).
+    pub rotor: f64,
     /// Side of the transmission that the log shows, for elasticity and play.
     pub side: EncoderSide,
     /// Standard error of the knob of elasticity or play, which is known by other means than a fit of columns; 0 elsewhere.
@@ -101,7 +103,7 @@ const RIPPLE: (f64, f64, usize) = (1.5, 0.35, 60);
 impl Candidate {
     /// A candidate without a knob, on the link's side.
     pub fn new(kind: Kind, joints: Vec<usize>) -> Candidate {
-        Candidate { kind, joints, shape: 0.0, inertia: 0.0, side: EncoderSide::Link, knob_error: 0.0 }
+        Candidate { kind, joints, shape: 0.0, inertia: 0.0, rotor: 0.0, side: EncoderSide::Link, knob_error: 0.0 }
     }
 
     /// Every candidate without a knob to turn that a robot offers: each kind at each joint, payloads at each leaf, couplings

@@ -1,5 +1,6 @@
 //! Whether a drive that turns on its own takes the place of a rigid one in what was chosen.
 
+use crate::climb;
 use crate::diagnose::{Logs, Progress};
 use crate::estimate::Fit;
 use crate::floor::noise_floor;
@@ -24,29 +25,25 @@ impl Logs<'_> {
         if joints.is_empty() {
             return Ok(rigid);
         }
-        let entries = |keep: &dyn Fn(Kind) -> bool| -> Vec<usize> {
-            (0..rigid.exact.entries.len()).filter(|&i| keep(rigid.exact.entries[i].candidate.kind)).collect()
+        let further = |kind: Kind| !kind.is_calibration();
+        let calibrated = if climb::kinds(&rigid.all, &rigid.choice.set).into_iter().any(further) {
+            Some(self.calibrated(&rigid, progress)?)
+        } else {
+            None
         };
-        let beside = entries(&|kind| kind != Kind::Armature);
-        let bodies = entries(&|kind| kind != Kind::Armature && kind.is_calibration());
+        let bases = [(Some(&rigid), false), (calibrated.as_ref(), false), (Some(&rigid), true)];
         let mut best: Option<Chosen> = None;
         let mut tried: Vec<(Candidate, f64)> = Vec::new();
-        for (set, through) in [(&beside, false), (&bodies, false), (&beside, true)] {
-            if best.is_some() {
+        for (base, through) in bases.into_iter().filter_map(|(base, through)| Some((base?, through))) {
+            if through && best.is_some() {
                 break;
             }
-            let others = if set.len() == beside.len() {
-                (rigid.exact.clone(), Fit { set: beside.clone(), ..rigid.fit.clone() })
-            } else {
-                let rest: Vec<Candidate> = set.iter().map(|&i| rigid.exact.entries[i].candidate.clone()).collect();
-                self.data(&rigid.noise).refine(&rest)?
-            };
+            let entries = &base.exact.entries;
+            let beside = (0..entries.len()).filter(|&i| entries[i].candidate.kind != Kind::Armature).collect();
+            let others = (base.exact.clone(), Fit { set: beside, ..base.fit.clone() });
             for account in self.accounts(&joints, &others.0, &others.1, through)?.into_iter().take(ACCOUNTS) {
                 let (all, place) = self.with_rotor(&rigid, account.drive.joints[0]);
-                let mut choice = rigid.choice.clone();
-                if set.len() < beside.len() {
-                    choice.set.retain(|&c| all.entries[c].candidate.kind.is_calibration());
-                }
+                let mut choice = base.choice.clone();
                 choice.set.push(place);
                 choice.set.sort_unstable();
                 choice.set.dedup();
@@ -78,11 +75,22 @@ impl Logs<'_> {
         Ok(Chosen { turned, tried, ..best })
     }
 
+    /// The best account of calibration alone: what was found beyond it may stand in for a drive.
+    fn calibrated(&self, rigid: &Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let (mut all, mut choice) = (rigid.all.clone(), rigid.choice.clone());
+        all.closed.extend(all.entries.iter().map(|e| e.candidate.kind).filter(|kind| !kind.is_calibration()));
+        choice.set.retain(|&c| all.entries[c].candidate.kind.is_calibration());
+        self.converge(all, choice, rigid.noise.clone(), None, progress)
+    }
+
     /// Joints of which more than noise is left, those with most of it first.
     fn restless(&self, chosen: &Chosen) -> Result<Vec<usize>, EffectError> {
         let rest = self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?;
         let floor = noise_floor(&self.signals, &self.band, &rest, self.model.dof());
-        let level = |j: usize| chosen.exact.sigma[j] / floor[j].max(f64::MIN_POSITIVE);
+        // Play shows for moments alone: what it leaves then counts in full.
+        let left = chosen.exact.left(&chosen.fit);
+        let calm = |j: usize| floor[j].min(chosen.exact.sigma[j]).max(f64::MIN_POSITIVE);
+        let level = |j: usize| left[j].sqrt() / calm(j);
         let mut joints: Vec<usize> =
             (0..self.model.dof()).filter(|&j| self.moving[j] && level(j) > MORE_THAN_NOISE).collect();
         joints.sort_by(|&a, &b| level(b).total_cmp(&level(a)));

@@ -5,7 +5,7 @@ use crate::problem::Problem;
 use crate::refine::Data;
 use crate::regimes::quantile;
 use gapscope_dynamics::Model;
-use gapscope_effects::{EffectError, Kind};
+use gapscope_effects::EffectError;
 
 /// Part of a fold that a joint must rest for its rests to tell: the blows of other joints would outweigh few of them.
 const RESTS: f64 = 0.1;
@@ -37,16 +37,14 @@ impl Held {
 }
 
 impl Fit {
-    /// Whether a Stribeck friction rises towards rest by more than it may be off by, at its printed interval. Any other kind
-    /// does. What does not rise is Coulomb friction.
+    /// Whether a friction that can do so rises towards rest by more than it may be off by, at its printed interval. Any other kind
+    /// does. What does not rise slides.
     pub fn rises(&self, problem: &Problem, model: &Model, candidate: usize, speeds: &[Vec<usize>]) -> bool {
         let kind = problem.entries[candidate].candidate.kind;
-        if kind != Kind::StribeckFriction {
-            return true;
-        }
+        let Some([sliding, at_rest]) = kind.card().at_rest else { return true };
         let told = self.told(problem, model, kind, &[candidate], speeds);
         let of = |name: &str| told.iter().find(|told| told.value.name == name);
-        let (Some(sliding), Some(at_rest)) = (of("coulomb"), of("static")) else { return false };
+        let (Some(sliding), Some(at_rest)) = (of(sliding), of(at_rest)) else { return false };
         let least: f64 = at_rest.value.value[0] - at_rest.components[0].half_width();
         least > sliding.value.value[0]
     }
@@ -58,7 +56,7 @@ impl Data<'_> {
     /// # Errors
     /// An effect that the robot cannot have.
     pub fn break_away(&self, problem: &mut Problem, fit: &Fit) -> Result<(), EffectError> {
-        let sticks = |&c: &usize| problem.entries[c].candidate.kind == Kind::StribeckFriction;
+        let sticks = |&c: &usize| problem.entries[c].candidate.kind.card().at_rest.is_some();
         let (set, others): (Vec<usize>, Vec<usize>) = fit.set.iter().partition(|c| sticks(c));
         if set.is_empty() {
             return Ok(());

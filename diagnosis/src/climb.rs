@@ -131,8 +131,8 @@ pub fn rivals(problem: &Problem, chosen: &Choice) -> Vec<Rival> {
             let kind = |c: &usize| problem.entries[*c].candidate.kind;
             let rest: Vec<usize> = chosen.set.iter().copied().filter(|c| kind(c) != without).collect();
             // A delay and a lag are told apart by other means.
-            let family: &[Kind] = if LATE.contains(&without) { &LATE } else { &[without] };
-            Some(competition.rival(without, &best, competition.climb(rest, family)?))
+            let family = told_together(without);
+            Some(competition.rival(without, &best, competition.climb(rest, &family)?))
         })
         .collect()
 }
@@ -195,7 +195,7 @@ impl<'a> Competition<'a> {
                     kind if kind.is_calibration() => 0.0,
                     _ => FURTHER,
                 };
-                let few = if kind == Kind::LinkInertiaError && used > 1 && used < places { SOME_LINKS } else { 0.0 };
+                let few = if kind.card().described && used > 1 && used < places { SOME_LINKS } else { 0.0 };
                 let shapes: f64 = of_kind.iter().map(|&c| (self.places[c].1 as f64).ln()).sum();
                 -(rare + few + shapes + (places as f64).ln() + ln_choose(places, used))
             })
@@ -210,8 +210,7 @@ impl<'a> Competition<'a> {
             // What has come to nothing is not there.
             let gone = |c: &usize| {
                 let own = &self.columns[*c];
-                !self.problem.entries[*c].candidate.has_optional_parts()
-                    && solved.at_nothing().any(|c| own.contains(&c))
+                !self.kind(*c).card().optional_parts && solved.at_nothing().any(|c| own.contains(&c))
             };
             if !set.iter().any(gone) {
                 return Some(Account { nats: solved.nats + self.prior(&set), set, score });
@@ -240,7 +239,7 @@ impl<'a> Competition<'a> {
             (0..self.columns.len()).filter(|&c| kinds(self.kind(c))).collect()
         };
         let all = of(&|kind| kind.is_calibration());
-        let light = of(&|kind| kind.is_calibration() && kind != Kind::LinkInertiaError);
+        let light = of(&|kind| kind.is_calibration() && !kind.card().described);
         [Vec::new(), light, all]
             .into_par_iter()
             .filter_map(|set| self.climb(set, &[]))
@@ -419,25 +418,20 @@ pub fn denied(problem: &Problem, chosen: &Choice) -> Vec<(usize, f64)> {
         .collect()
 }
 
-/// Dry friction of a joint is one of these.
-const DRY: [Kind; 4] = [Kind::CoulombFriction, Kind::StribeckFriction, Kind::PreslidingFriction, Kind::ThermalDrift];
+/// Kinds that a delay or a lag is told from by other means than a climb; another kind itself.
+pub fn told_together(kind: Kind) -> Vec<Kind> {
+    if kind.card().is_late() { late().collect() } else { vec![kind] }
+}
+
 /// Ways in which effort acts late.
-pub const LATE: [Kind; 2] = [Kind::ActuationDelay, Kind::ActuatorLag];
-/// A spring's rest position is a bias.
-const CONSTANT: [Kind; 2] = [Kind::ParallelSpring, Kind::TorqueBias];
-/// Kinds that act at one place.
-const OF_A_PLACE: [Kind; 2] = [Kind::Rub, Kind::Catch];
+pub fn late() -> impl Iterator<Item = Kind> {
+    Kind::ALL.into_iter().filter(|kind| kind.card().is_late())
+}
 
 /// Whether two candidates must not stand side by side: two of one kind at the same joints, or two accounts of the same force.
 pub fn excludes(problem: &Problem, a: usize, b: usize) -> bool {
     let (a, b) = (&problem.entries[a].candidate, &problem.entries[b].candidate);
-    let both = |family: &[Kind]| family.contains(&a.kind) && family.contains(&b.kind);
-    let one_of_each = |one: Kind, others: &[Kind]| {
-        (a.kind == one && others.contains(&b.kind)) || (b.kind == one && others.contains(&a.kind))
-    };
-    // Where a place rubs, efforts are great, and a limit would cut them.
-    let force = both(&DRY) || both(&CONSTANT) || one_of_each(Kind::TorqueSaturation, &OF_A_PLACE);
-    (a.joints == b.joints && (a.kind == b.kind || force)) || both(&LATE)
+    a.joints == b.joints && a.kind.excludes(b.kind)
 }
 
 /// Logarithm of the number of ways to choose `k` of `n`.

@@ -350,14 +350,15 @@ impl Logs<'_> {
             let time = s.first as f64 * s.raw.dt + row.center as f64 * s.dt;
             s.pushed.iter().all(|[from, to]| time < from - EDGE || time > to + EDGE)
         };
-        let pushes = effects.iter().any(|e| e.kind() == Kind::ExternalContact);
+        let pushes = effects.iter().any(|e| e.kind().card().of_its_log);
         let counts = |i: usize| !pushes || untouched(i);
         let concern = gap::weights_of_concern(model, &self.signals, &self.moving);
         // An impact a moment early or late is no fault of the play that makes it, and all joints feel it.
         let mut chatters = vec![false; model.dof()];
         for &c in &fit.set {
             let candidate = &problem.entries[c].candidate;
-            candidate.joints.iter().for_each(|&j| chatters[j] |= candidate.kind == Kind::Backlash);
+            let jolts = candidate.kind.card().turning.is_some_and(|turning| turning.jolts);
+            candidate.joints.iter().for_each(|&j| chatters[j] |= jolts);
         }
         let blocks = |rows: &Rows| gap::squares(&self.band, rows, counts);
         let calm = gap::calm(&blocks(&after.rows), &concern, &chatters);
@@ -384,7 +385,7 @@ impl Logs<'_> {
             encoder_side: side,
             alignment: fit.alignment(),
             // A push belongs to its own log.
-            effects: effects.into_iter().filter(|e| e.kind() != Kind::ExternalContact).collect(),
+            effects: effects.into_iter().filter(|e| !e.kind().card().of_its_log).collect(),
             made_from: None,
         };
         let gap_of = |held_out: &HeldOut| Gap {

@@ -21,7 +21,7 @@ use crate::gap;
 use crate::kernel::apply;
 use crate::problem::Problem;
 use crate::signals::{Signals, derivative_kernel};
-use gapscope_effects::{Candidate, EffectError, EncoderSide, JointRun, Kind};
+use gapscope_effects::{Candidate, EffectError, EncoderSide, JointRun, Kind, Turning};
 use nalgebra::{Matrix2, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -30,10 +30,6 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
-/// Resonances of the link on its locked motor that are tried first, Hz.
-const RESONANCE: [f64; 6] = [2.0, 3.0, 4.5, 6.5, 9.0, 13.0];
-/// Gaps that are tried first, rad or m: the basin of the true one is narrow.
-const GAP: [f64; 13] = [0.0004, 0.0008, 0.0016, 0.003, 0.0045, 0.0065, 0.0095, 0.013, 0.018, 0.025, 0.035, 0.05, 0.07];
 /// Rotors that are tried first with each, as parts of the inertia that they turn.
 const ROTOR: [f64; 7] = [0.1, 0.2, 0.33, 0.5, 0.7, 1.0, 1.4];
 /// The best so many of these pairs go on.
@@ -54,13 +50,6 @@ const PART: f64 = 0.85;
 /// few of them.
 const OF_NOISE: f64 = 0.25;
 const NOTHING: f64 = 1e-3;
-/// What is looked for through a filter. A spring behind an encoder on the link is told by the torque that the rotor takes as
-/// the spring winds up, which grows with the fourth power of the frequency, and so does noise: above the resonance of rotor
-/// and link on the spring it drowns what both accounts leave.
-const FILTERED: (Kind, EncoderSide) = (Kind::JointElasticity, EncoderSide::Link);
-/// Resonances, Hz, between which a spring is one that somebody would build and that these logs could show.
-const SOFTEST: f64 = 1.5;
-const STIFFEST: f64 = 20.0;
 /// A rotor lighter than this part of what it turns would not show.
 const LIGHTEST: f64 = 0.05;
 /// So many blocks of time must show something at all: a joint that its load holds on one side may cross its play once or twice.
@@ -68,8 +57,6 @@ const LEAST_TELLING: usize = 2;
 /// Standard errors from a rigid drive up to which the drive may be rigid: what the best of the hundred tries at each joint
 /// finds in noise, and what [`crate::search`] asks of a drive before any log is seen, k²/2 = 13 nats.
 const RIGID: f64 = 5.0;
-/// Gap, rad or m, that a drive would be mended for before anybody logged it.
-const WIDEST: f64 = 0.15;
 const SEED: u64 = 5;
 
 /// An account of one joint's drive that leaves less than a rigid one.
@@ -186,7 +173,7 @@ impl<'a> Study<'a> {
             rigid: Rigid::default(),
             through,
         };
-        let rigid = Candidate::new(Kind::Armature, vec![joint]);
+        let rigid = Candidate::rotor(joint);
         study.rotor = study.least_squares_rotor(&rigid);
         let rest: Vec<Vec<f64>> = study.runs.iter().map(|run| run.left_by(&rigid, study.rotor)).collect();
         // What is white of the effort, and not taken up by the motion, is noise of its measurement.
@@ -218,14 +205,14 @@ impl<'a> Study<'a> {
         if !tells(&self.rigid, &self.rigid.left) {
             return None;
         }
-        let rest = self.rows(&Candidate::new(Kind::Armature, vec![self.joint]), self.rotor, View::default());
+        let rest = self.rows(&Candidate::rotor(self.joint), self.rotor, View::default());
         let left_of = |e: usize| mean_square(&rest[self.logs.band.of_episode[e].clone()]);
         let episode = (0..self.runs.len()).max_by(|&a, &b| left_of(a).total_cmp(&left_of(b)));
         let first = self.rigid_in(View { episode, smooth: None });
         let mut best: Option<(f64, Candidate, f64)> = None;
         for side in [EncoderSide::Link, EncoderSide::Motor] {
-            for (kind, grid) in [(Kind::JointElasticity, &RESONANCE[..]), (Kind::Backlash, &GAP)] {
-                if self.through && (kind, side) != FILTERED {
+            for (kind, turning) in turning() {
+                if self.through && turning.filtered != Some(side) {
                     continue;
                 }
                 let at = &|shape: f64| Candidate {
@@ -238,7 +225,7 @@ impl<'a> Study<'a> {
                 // Where most of the time is spent in the gap, the rotor of a rigid drive is far off.
                 let rotors = || ROTOR.iter().map(|part| part * self.inertia).chain([self.rotor]);
                 let open: Vec<(Candidate, f64)> =
-                    grid.iter().flat_map(|&shape| rotors().map(move |rotor| (at(shape), rotor))).collect();
+                    turning.first.iter().flat_map(|&shape| rotors().map(move |rotor| (at(shape), rotor))).collect();
                 let measures = self.first_measures(episode, &first, &open);
                 let mut tried: Vec<(f64, Candidate, f64)> =
                     measures.into_iter().zip(open).map(|(measure, (drive, rotor))| (measure, drive, rotor)).collect();
@@ -255,7 +242,7 @@ impl<'a> Study<'a> {
                 let measure = self.measure(&drive, rotor);
                 // A drive that may be rigid is another account's, and so is a gap that no gear has.
                 let drive = Candidate { knob_error: self.error(&drive, rotor), ..drive };
-                if drive.errors_from_rigid() < RIGID || (kind == Kind::Backlash && drive.shape > WIDEST) {
+                if drive.errors_from_rigid() < RIGID || drive.shape > turning.widest {
                     continue;
                 }
                 if best.as_ref().is_none_or(|(least, ..)| measure < *least) {
@@ -267,8 +254,8 @@ impl<'a> Study<'a> {
         let rigid = self.against(&drive, rotor);
         let beyond = beyond_doubt(&rigid, &self.left(&drive, rotor, &rigid))?;
         // At the edge of what a drive can be, it stands in for something else.
-        let possible =
-            self.shows(rotor) && (drive.kind != Kind::JointElasticity || (SOFTEST..STIFFEST).contains(&drive.shape));
+        let (least, greatest) = drive.kind.card().turning?.possible;
+        let possible = self.shows(rotor) && (least..greatest).contains(&drive.shape);
         possible.then_some(Account { drive, beyond })
     }
 
@@ -294,7 +281,7 @@ impl<'a> Study<'a> {
     /// Knob and rotor of a drive after some Gauss–Newton steps in compliance or gap, in which what is left is nearly linear;
     /// blocks count by what is left of them.
     fn descend(&self, mut drive: Candidate, mut rotor: f64) -> (Candidate, f64) {
-        let power = if drive.kind == Kind::JointElasticity { -0.5 } else { 1.0 };
+        let power = drive.kind.card().turning.map_or(1.0, |turning| turning.power);
         let view = self.view(&drive, rotor);
         let nothing = self.against(&drive, rotor).nothing;
         for _ in 0..DESCENTS {
@@ -366,13 +353,14 @@ impl<'a> Study<'a> {
     /// How an account of the drive is held against a rigid one: springs, where a filter is asked for, through one that cuts
     /// at the resonance of rotor and link on the spring.
     fn view(&self, drive: &Candidate, rotor: f64) -> View {
-        let filtered = self.through && (drive.kind, drive.side) == FILTERED;
+        let filtered =
+            self.through && drive.kind.card().turning.is_some_and(|turning| turning.filtered == Some(drive.side));
         let resonance = || TAU * drive.shape * (1.0 + drive.inertia / rotor).sqrt();
         View { episode: None, smooth: filtered.then(resonance) }
     }
 
     fn rigid_in(&self, view: View) -> Rigid {
-        let account = Candidate::new(Kind::Armature, vec![self.joint]);
+        let account = Candidate::rotor(self.joint);
         let (rest, noise) = self.rows_and_noise(&account, self.rotor, view);
         let seen: Vec<f64> = noise.iter().copied().filter(|noise| *noise > 0.0).collect();
         let nothing = OF_NOISE * mean(&seen) + self.unnoticed;
@@ -495,6 +483,11 @@ impl<'a> Study<'a> {
         }
         dot(&scores, &scores).sqrt() / dot(&own, &own).max(f64::MIN_POSITIVE)
     }
+}
+
+/// The kinds whose motor turns on its own, and how.
+fn turning() -> impl Iterator<Item = (Kind, Turning)> {
+    Kind::ALL.into_iter().filter_map(|kind| Some((kind, kind.card().turning?)))
 }
 
 /// Whether enough blocks of time show something, by what is left of each.

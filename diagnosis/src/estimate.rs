@@ -1,7 +1,6 @@
 //! From coefficients to effects with parameters and intervals.
 
 use crate::band::Band;
-use crate::climb::LATE;
 use crate::problem::Problem;
 use crate::schema::{Estimate, Parameter, Quantity};
 use crate::signals::Signals;
@@ -11,13 +10,6 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 
-/// What sampling, integration and the laws themselves leave of any parameter, as a part of it; no number of rows averages
-/// that out.
-const SYSTEMATIC: f64 = 3e-3;
-/// The same of friction: near rest, where simulators soften it and robots creep, no law is the law.
-const OF_FRICTION: f64 = 1e-2;
-/// When an effort acts within its sample, loggers and simulators do not say to better than this part of a sample.
-const TIMING: f64 = 0.2;
 /// Step of the numerical derivative from coefficients to parameters, in standard errors.
 const STEP: f64 = 1e-3;
 
@@ -212,7 +204,7 @@ impl Fit {
                 })
                 .collect();
             for (v, estimate) in estimates.iter().enumerate() {
-                let systematic = if Kind::FRICTION.contains(&kind) { OF_FRICTION } else { SYSTEMATIC };
+                let systematic = kind.card().exact_to;
                 let size = estimate.value.iter().map(|x| x * x).sum::<f64>().sqrt();
                 let at_rest = problem.entries[c].held(self.without);
                 let components = (0..estimate.value.len())
@@ -225,7 +217,8 @@ impl Fit {
                                 })
                             })
                             .collect();
-                        if let ("static", Some(held)) = (estimate.name, at_rest.as_ref())
+                        if let (Some([_, resting]), Some(held)) = (kind.card().at_rest, at_rest.as_ref())
+                            && estimate.name == resting
                             && estimate.value == [held.torque]
                         {
                             let own = held.doubt.hypot(systematic * size);
@@ -236,7 +229,7 @@ impl Fit {
                         let knob = knob_moved
                             .as_ref()
                             .map_or(0.0, |moved| moved[v].value[component] - estimate.value[component]);
-                        let timing = if LATE.contains(&kind) { TIMING * problem.sample } else { 0.0 };
+                        let timing = kind.card().exact_to_samples * problem.sample;
                         let knob = knob * quantile(problem.blocks_used());
                         let own = knob.hypot(systematic * size).hypot(timing);
                         Component { gradient: at.iter().copied().zip(gradient).collect(), shared: square.sqrt(), own }

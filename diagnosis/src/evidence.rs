@@ -7,7 +7,7 @@ use crate::problem::Problem;
 use crate::schema::{EffectCurve, Evidence, Series};
 use crate::signals::Signals;
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::Kind;
+use gapscope_effects::{Axis, Kind};
 use std::collections::BTreeMap;
 
 /// The signal on the horizontal axis of a curve, joint-major.
@@ -60,6 +60,18 @@ pub fn evidence(
     Evidence { torque, curves: curves(model, signals, band, standstill, problem, fit, after), ..Evidence::default() }
 }
 
+/// What a curve is drawn over, in words, and the signal where it is one.
+fn axis(axis: Axis, prismatic: bool) -> (&'static str, Option<Pick>) {
+    let (units, signal): ([&str; 2], Option<Pick>) = match axis {
+        Axis::Speed => (["speed, rad/s", "speed, m/s"], Some(|s| &s.v)),
+        Axis::Acceleration => (["acceleration, rad/s²", "acceleration, m/s²"], Some(|s| &s.a)),
+        Axis::Position => (["position, rad", "position, m"], Some(|s| &s.q)),
+        Axis::Effort => (["logged effort, N m", "logged effort, N"], Some(|s| &s.tau)),
+        Axis::Prediction => (["predicted, N m", "predicted, N"], None),
+    };
+    (units[usize::from(prismatic)], signal)
+}
+
 fn curves(
     model: &Model,
     signals: &[Signals],
@@ -101,19 +113,7 @@ fn curves(
         .into_iter()
         .map(|((kind, j), part)| {
             let prismatic = model.joints()[j].kind == JointKind::Prismatic;
-            let (label, signal): (&str, Option<Pick>) = match (kind, prismatic) {
-                (Kind::ViscousFriction | Kind::CoulombFriction, false) => ("speed, rad/s", Some(|s| &s.v)),
-                (Kind::ViscousFriction | Kind::CoulombFriction, true) => ("speed, m/s", Some(|s| &s.v)),
-                (Kind::Armature, false) => ("acceleration, rad/s²", Some(|s| &s.a)),
-                (Kind::Armature, true) => ("acceleration, m/s²", Some(|s| &s.a)),
-                (Kind::ParallelSpring | Kind::TorqueBias, false) => ("position, rad", Some(|s| &s.q)),
-                (Kind::ParallelSpring | Kind::TorqueBias, true) => ("position, m", Some(|s| &s.q)),
-                (Kind::TorqueGainError, false) => ("logged effort, N m", Some(|s| &s.tau)),
-                (Kind::TorqueGainError, true) => ("logged effort, N", Some(|s| &s.tau)),
-                // Effects of many variables are drawn against their own prediction.
-                (_, false) => ("predicted, N m", None),
-                (_, true) => ("predicted, N", None),
-            };
+            let (label, signal) = axis(kind.card().axis, prismatic);
             let x: Vec<f64> = match signal {
                 Some(signal) => signals.iter().enumerate().flat_map(|(e, s)| band.filter(e, &signal(s)[j])).collect(),
                 None => part.clone(),

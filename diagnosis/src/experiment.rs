@@ -14,7 +14,7 @@ use crate::schema::{FoundEffect, NextExperiment};
 use crate::signals::{Signals, standstill};
 use gapscope_datasets::{Episode, Reference, ReferenceKind, Trajectory};
 use gapscope_dynamics::{Data as Scratch, Model};
-use gapscope_effects::{Effect, EffectError, EncoderSide, Kind, Motion, Plant};
+use gapscope_effects::{Apart, Effect, EffectError, EncoderSide, Kind, Motion, Plant};
 use rayon::prelude::*;
 
 /// Name of the file that holds the motion.
@@ -151,20 +151,18 @@ pub fn next_experiment(
 
 /// What tells effects apart that no motion does.
 fn beyond_motion(kinds: &[Kind]) -> &'static str {
-    let has = |kind| kinds.contains(&kind);
-    if has(Kind::ExternalContact) {
-        "log again with nothing touching the robot"
-    } else if has(Kind::GravityMisalignment) {
-        "log with the base turned about the vertical: what a tilt does changes, what belongs to a joint stays"
-    } else if has(Kind::TorqueGainError) {
-        "repeat the motion with a known mass at the flange: a gain scales its torque, other effects do not"
-    } else if has(Kind::Payload) {
-        "log without the load, or weigh it"
-    } else if has(Kind::Armature) && has(Kind::LinkInertiaError) {
-        "they are one number in every motion; take the rotor's inertia from the drive's data sheet, or the link's from its design"
-    } else {
-        "log the torque on the link's side of the gear too (effort_link), or with a known mass at the flange"
-    }
+    let alone = |kind: &Kind| match kind.card().apart {
+        Apart::By(rank, words) => Some((rank, words)),
+        _ => None,
+    };
+    let from = |kind: &Kind| match kind.card().apart {
+        Apart::From(other, words) if kinds.contains(&other) => Some(words),
+        _ => None,
+    };
+    let otherwise =
+        "log the torque on the link's side of the gear too (effort_link), or with a known mass at the flange";
+    let alone = kinds.iter().filter_map(alone).max_by_key(|(rank, _)| *rank).map(|(_, words)| words);
+    alone.or_else(|| kinds.iter().find_map(from)).unwrap_or(otherwise)
 }
 
 /// What to log where nothing was excited.

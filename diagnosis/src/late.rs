@@ -4,11 +4,11 @@
 //! by the model (instrumental variables; Söderström and Stoica, Instrumental Variable Methods for System Identification,
 //! 1983).
 
-use crate::climb::{Choice, LATE};
+use crate::climb::Choice;
 use crate::diagnose::Logs;
 use crate::gap::{self, Rows};
 use crate::search::{Chosen, with_drive};
-use gapscope_effects::{Candidate, EffectError, Kind};
+use gapscope_effects::{Candidate, EffectError, lagged};
 
 /// Standard error below which the part that speaks for the other law is not believed: no drive is one or the other exactly.
 const INEXACT: f64 = 0.15;
@@ -22,7 +22,7 @@ const WIDER: f64 = 2.0;
 impl Logs<'_> {
     /// The choice with the likelier of delay and lag where it has one of them, and the probability that it is the other.
     pub(crate) fn delay_or_lag(&self, mut chosen: Chosen) -> Result<Chosen, EffectError> {
-        let late = |c: &usize| LATE.contains(&chosen.all.entries[*c].candidate.kind);
+        let late = |c: &usize| chosen.all.entries[*c].candidate.kind.card().is_late();
         let Some(at) = chosen.choice.set.iter().position(late) else { return Ok(chosen) };
         let law = &chosen.exact.entries[at].candidate;
         let far = |c: usize| (chosen.all.entries[c].candidate.shape - law.shape).abs();
@@ -84,50 +84,31 @@ impl Logs<'_> {
 /// What the first law makes of a torque, smoothed, less what the second does; `h` s from sample to sample.
 fn difference(torque: &[f64], laws: [&Candidate; 2], h: f64) -> Vec<f64> {
     let wide = (WIDER * laws[0].shape.max(laws[1].shape)).max(SMOOTH);
-    let mut smooth = passed(torque, Kind::ActuatorLag, wide, h);
+    let mut smooth = lagged(torque, wide, h);
     smooth.reverse();
-    smooth = passed(&smooth, Kind::ActuatorLag, wide, h);
+    smooth = lagged(&smooth, wide, h);
     smooth.reverse();
-    let [first, second] = laws.map(|law| passed(&smooth, law.kind, law.shape, h));
+    let passed = |law: &Candidate| law.kind.card().passes.map_or_else(Vec::new, |pass| pass(&smooth, law.shape, h));
+    let [first, second] = laws.map(passed);
     first.iter().zip(second).map(|(a, b)| a - b).collect()
-}
-
-/// A signal, with `h` s from sample to sample, as a delay or a lag of `time` s passes it on.
-fn passed(x: &[f64], kind: Kind, time: f64, h: f64) -> Vec<f64> {
-    if kind == Kind::ActuationDelay {
-        let at = |k: usize| {
-            let place = (k as f64 - time / h).max(0.0);
-            let before = place.floor() as usize;
-            x[before] + place.fract() * (x[(before + 1).min(k)] - x[before])
-        };
-        return (0..x.len()).map(at).collect();
-    }
-    // By the trapezoidal rule: half a sample more or less would be a difference of its own.
-    let (keep, take) = ((2.0 * time - h) / (2.0 * time + h), h / (2.0 * time + h));
-    let mut y = x.first().copied().unwrap_or(0.0);
-    (0..x.len())
-        .map(|k| {
-            y = keep * y + take * (x[k] + x[k.saturating_sub(1)]);
-            y
-        })
-        .collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::climb::late;
 
     #[test]
     fn a_delay_and_a_lag_pass_a_ramp_on_as_late_and_a_sine_by_their_own_law() {
         let (h, time) = (2e-3, 0.0117);
         let ramp: Vec<f64> = (0..500).map(|k| 3.0 * h * k as f64).collect();
-        for kind in LATE {
-            let late = (ramp[499] - passed(&ramp, kind, time, h)[499]) / 3.0;
+        let passes: Vec<_> = late().map(|kind| (kind, kind.card().passes.unwrap())).collect();
+        for (kind, pass) in &passes {
+            let late = (ramp[499] - pass(&ramp, time, h)[499]) / 3.0;
             assert!((late - time).abs() < 1e-9, "{kind}: {late}");
         }
         let omega = 30.0;
         let sine: Vec<f64> = (0..500).map(|k| (omega * h * k as f64).sin()).collect();
-        let (delayed, lagged) = (passed(&sine, LATE[0], time, h), passed(&sine, LATE[1], time, h));
+        let (delayed, lagged) = (passes[0].1(&sine, time, h), passes[1].1(&sine, time, h));
         for k in 300..500 {
             let at = omega * h * k as f64;
             assert!((delayed[k] - (at - omega * time).sin()).abs() < 1e-3);

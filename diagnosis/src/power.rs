@@ -10,7 +10,7 @@ use crate::drive::Least;
 use crate::problem::Problem;
 use crate::schema::Power;
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::{Candidate, Effect, Kind};
+use gapscope_effects::{Candidate, Effect, Gauge, Kind, Size};
 use nalgebra::{DMatrix, DVector};
 
 /// Part of a column's size below which what the set leaves of it is rounding.
@@ -18,15 +18,6 @@ const ROUNDING: f64 = 1e-7;
 
 /// Nats by which an effect must be likelier than none for it to be called seen.
 const LEAST_ODDS: f64 = 3.0;
-
-/// One size of an effect, and what of it is measured.
-struct Gauge {
-    parameter: &'static str,
-    /// Coefficients of a unit.
-    direction: Vec<f64>,
-    /// Whether the other coefficients of the effect may take any value beside, so that only what none of them can do counts.
-    beside_others: bool,
-}
 
 /// The least size of every effect at every joint; kinds in the order of the catalogue. The knob of an effect that has one,
 /// where it is not the size itself, is that in the middle of its grid. Those of springs and play in the `drives` are known.
@@ -48,10 +39,7 @@ pub fn power(model: &Model, problem: &Problem, set: &[usize], drives: &[Least]) 
 /// The least spring or play in a drive.
 fn of_drive(model: &Model, Least { kind, joint, drive }: &Least) -> Power {
     let joints = [*joint];
-    let (parameter, units) = match kind {
-        Kind::JointElasticity => ("stiffness", ["N m/rad", "N/m"]),
-        _ => ("gap", ["rad", "m"]),
-    };
+    let (parameter, units) = kind.card().turning.map_or(("", [""; 2]), |turning| turning.parameter);
     let value =
         |effect: Effect| effect.law().parameters().into_iter().find(|v| v.name == parameter)?.value.first().copied();
     let size = drive.as_ref().and_then(|(drive, rotor)| drive.effects(model, &[*rotor]).into_iter().find_map(value));
@@ -76,28 +64,33 @@ fn sizes(model: &Model, problem: &Problem, set: &[usize], kind: Kind, joints: &[
     here.sort_by(|&a, &b| problem.entries[a].candidate.shape.total_cmp(&problem.entries[b].candidate.shape));
     let Some(&first) = here.first() else { return Vec::new() };
     let named = |parameter, size, unit| named(model, kind, joints, parameter, size, unit);
-    if kind == Kind::TorqueSaturation {
+    let card = kind.card();
+    if let Size::Knob(parameter, units) = card.size {
         // The knob is the size: the greatest limit of the grid that cuts enough away.
         let seen = |&&c: &&usize| least(problem, set, c, &[1.0], false).is_some_and(|least| least <= 1.0);
         let limit = here.iter().rev().find(seen).map(|&c| problem.entries[c].candidate.shape);
-        return vec![named("limit", limit, unit(model, joints, ["N m", "N"]))];
+        return vec![named(parameter, limit, unit(model, joints, units))];
     }
-    // A late effort is linear about no delay; a coupling's weight is a choice, not a size.
-    let late = matches!(kind, Kind::ActuationDelay | Kind::ActuatorLag);
-    let c = if late || kind == Kind::JointCoupling { first } else { here[here.len() / 2] };
+    // A late effort is linear about no delay; a knob that is a choice is no size.
+    let late = card.is_late();
+    let c = if late || card.is_chosen() { first } else { here[here.len() / 2] };
     let candidate = &problem.entries[c].candidate;
-    gauges(model, candidate)
-        .into_iter()
+    let point = point_mass(model, candidate);
+    let gauges: &[Gauge] = match card.size {
+        Size::Along(gauges) => gauges,
+        Size::PointMass(parameter) => &[Gauge { parameter, nothing: 0.0, direction: &point, beside_others: false }],
+        Size::Knob(..) | Size::Unasked => &[],
+    };
+    (gauges.iter())
         .map(|gauge| {
-            let theta = least(problem, set, c, &gauge.direction, gauge.beside_others)
+            let theta = least(problem, set, c, gauge.direction, gauge.beside_others)
                 // The alignment takes up half a sample of any delay.
                 .map(|theta| if late { theta + problem.bounds[0].1 } else { theta });
             let coefficients: Vec<f64> = gauge.direction.iter().map(|x| x * theta.unwrap_or(1.0)).collect();
             let effects = candidate.effects(model, &coefficients);
             let effect = effects.iter().find(|effect| effect.kind() == kind);
             let value = effect.and_then(|e| e.law().parameters().into_iter().find(|v| v.name == gauge.parameter));
-            let of_one = if kind == Kind::TorqueGainError { 1.0 } else { 0.0 };
-            let size = theta.and(value.as_ref()).and_then(|v| Some((v.value.first()? - of_one).abs()));
+            let size = theta.and(value.as_ref()).and_then(|v| Some((v.value.first()? - gauge.nothing).abs()));
             named(gauge.parameter, size, value.map_or("", |v| unit(model, joints, [v.unit, v.unit_prismatic])))
         })
         .collect()
@@ -108,37 +101,11 @@ fn unit(model: &Model, joints: &[usize], [turning, sliding]: [&'static str; 2]) 
     if slides { sliding } else { turning }
 }
 
-/// What of an effect is measured. A payload, and what a link has too much, is a point at the link's own centre of mass; dry
-/// friction that drifts ends at nothing.
-fn gauges(model: &Model, candidate: &Candidate) -> Vec<Gauge> {
-    let along = |parameter, direction: &[f64]| Gauge { parameter, direction: direction.to_vec(), beside_others: false };
-    let point = |parameter| {
-        let body = candidate.joints.first().and_then(|&j| model.joints()[j].inertia.center_of_mass());
-        let [x, y, z] = body.unwrap_or_default().to_array();
-        along(parameter, &[1.0, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
-    };
-    let one = match candidate.kind {
-        Kind::ViscousFriction => along("viscous", &[1.0]),
-        Kind::CoulombFriction | Kind::PreslidingFriction => along("coulomb", &[1.0]),
-        Kind::LoadDependentFriction => along("load_coefficient", &[1.0]),
-        Kind::StribeckFriction => Gauge { beside_others: true, ..along("static", &[0.0, 1.0]) },
-        Kind::ThermalDrift => along("coulomb", &[0.0, 1.0]),
-        Kind::Armature => along("armature", &[1.0]),
-        Kind::TorqueGainError => along("gain", &[1.0]),
-        Kind::TorqueBias => along("bias", &[1.0]),
-        Kind::TorqueRipple => along("amplitude", &[1.0, 0.0]),
-        Kind::ParallelSpring => Gauge { beside_others: true, ..along("stiffness", &[1.0, 0.0]) },
-        Kind::JointZeroOffset => along("offset", &[1.0]),
-        Kind::Payload => point("mass"),
-        Kind::LinkInertiaError => point("mass_delta"),
-        Kind::JointCoupling => along("coulomb", &[0.0, 1.0, 0.0]),
-        Kind::ActuationDelay => along("delay", &[1.0]),
-        Kind::ActuatorLag => along("time_constant", &[1.0]),
-        Kind::GravityMisalignment => return vec![along("roll", &[0.0, 1.0]), along("pitch", &[1.0, 0.0])],
-        // When something pushes is not known before; a limit is no coefficient.
-        _ => return Vec::new(),
-    };
-    vec![one]
+/// A kilogram at the centre of mass of a candidate's link, in the ten inertial parameters.
+fn point_mass(model: &Model, candidate: &Candidate) -> [f64; 10] {
+    let center = candidate.joints.first().and_then(|&j| model.joints()[j].inertia.center_of_mass());
+    let [x, y, z] = center.unwrap_or_default().to_array();
+    [1.0, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y]
 }
 
 /// The least multiple of a direction of a candidate's coefficients at which the selection names it beside a set; `None`

@@ -7,19 +7,9 @@ use crate::floor::noise_floor;
 use crate::gap::{self, Rows};
 use crate::problem::{Entry, Term};
 use crate::signals::Signals;
-use gapscope_effects::{Candidate, EffectError, Kind, Motion, Plant};
+use gapscope_effects::{Candidate, EffectError, Force, Kind, Motion, Plant};
 use rayon::prelude::*;
 
-/// Kinds that are taken into account while looking for something outside that pushes.
-const COMMON: [Kind; 7] = [
-    Kind::ViscousFriction,
-    Kind::CoulombFriction,
-    Kind::Armature,
-    Kind::TorqueBias,
-    Kind::GravityMisalignment,
-    Kind::Payload,
-    Kind::LinkInertiaError,
-];
 /// Times, at most, that what pushes and what the robot lacks are told apart, each beside the other.
 const LOOKS: usize = 3;
 
@@ -57,9 +47,10 @@ impl Logs<'_> {
     /// What the commonest candidates leave of the logs beside the pushes known so far, these left in it, and the torque of
     /// the force that these show if it were always there.
     fn left_beside_pushes(&self, noise: &[f64]) -> (Left, Rows) {
-        let kinds = [&COMMON[..], &[Kind::ExternalContact]].concat();
+        let kinds: Vec<Kind> =
+            Kind::ALL.into_iter().filter(|kind| kind.card().common || kind.card().of_its_log).collect();
         let mut candidates = Candidate::all(self.model);
-        candidates.retain(|c| COMMON.contains(&c.kind));
+        candidates.retain(|c| c.kind.card().common);
         if self.signals.iter().any(|s| !s.pushed.is_empty()) {
             candidates.extend(Candidate::contacts(self.model));
         }
@@ -67,9 +58,10 @@ impl Logs<'_> {
         let problem = self.data(noise).problem(terms, &kinds);
         let theta = problem.robust();
         let n = self.model.dof();
-        let of_kind = |e: &&Entry, kind: Kind| e.candidate.kind == kind;
+        let pushes = |e: &&Entry| e.candidate.kind.card().of_its_log;
+        let holds_still = |e: &&Entry| e.candidate.kind.card().force == Some(Force::Dry);
         let mut holds = vec![0.0; n];
-        for e in problem.entries.iter().filter(|e| of_kind(e, Kind::CoulombFriction)) {
+        for e in problem.entries.iter().filter(holds_still) {
             e.candidate.joints.iter().for_each(|&j| holds[j] += theta[e.columns.start].abs());
         }
         let torque = |s: &Signals, keep: &dyn Fn(&&Entry) -> bool| {
@@ -85,7 +77,7 @@ impl Logs<'_> {
             torque
         };
         let rest = |s: &Signals| -> Vec<Vec<f64>> {
-            let own = torque(s, &|e| !of_kind(e, Kind::ExternalContact));
+            let own = torque(s, &|e| !pushes(e));
             let left =
                 |j: usize| s.tau[j].iter().zip(&s.nominal[j]).zip(&own[j]).map(|((t, n), o)| t - n - o).collect();
             (0..n).map(left).collect()
@@ -98,7 +90,7 @@ impl Logs<'_> {
             gap::at_rows(&self.band, &self.signals.iter().map(of).collect::<Vec<_>>(), n)
         };
         let (rest, still) = (at_rows(&rest), at_rows(&still));
-        let always = at_rows(&|s| torque(s, &|e| of_kind(e, Kind::ExternalContact)));
+        let always = at_rows(&|s| torque(s, &pushes));
         (Left::new(rest, &still, &holds), always)
     }
 }

@@ -14,23 +14,8 @@ use rayon::prelude::*;
 const ROUNDS: usize = 8;
 /// Rounds, at least, where some torque bends with the coefficients.
 const ROUNDS_FOR_BENT: usize = 6;
-/// Kinds whose torque bends with their own parameters or with those of others.
-const BENT: [Kind; 7] = [
-    Kind::LoadDependentFriction,
-    Kind::Payload,
-    Kind::GravityMisalignment,
-    Kind::TorqueGainError,
-    Kind::JointZeroOffset,
-    Kind::JointElasticity,
-    Kind::Backlash,
-];
 /// Relative change of a knob at which it has settled.
 const SETTLED: f64 = 2e-3;
-/// Least and greatest of a knob over where it began: beyond them it is another law.
-const KNOB: (f64, f64) = (0.2, 5.0);
-/// The same for a limit: far below where it is reached it would cut away what it is to explain.
-const LIMIT: (f64, f64) = (0.8, 1.5);
-
 /// The logs that a problem is made from.
 #[derive(Clone, Copy)]
 pub struct Data<'a> {
@@ -127,9 +112,8 @@ impl Data<'_> {
         let candidate = |c: usize| &problem.entries[c].candidate;
         let effects = fit.effects(problem, self.model);
         let side = problem.side(&fit.set);
-        let crossed = effects.iter().any(|effect| effect.kind() == Kind::Backlash);
-        let early =
-            |c: &usize| !matches!(candidate(*c).kind, Kind::ActuationDelay | Kind::ActuatorLag | Kind::TorqueGainError);
+        let crossed = effects.iter().any(|effect| effect.kind().card().turning.is_some_and(|turning| turning.jolts));
+        let early = |c: &usize| !candidate(*c).kind.card().on_effort;
         let taken = Fit { set: fit.set.iter().copied().filter(early).collect(), ..fit.clone() };
         let taken = taken.effects(problem, self.model);
         self.signals
@@ -161,9 +145,9 @@ impl Data<'_> {
         let mut terms: Vec<Term> = candidates.iter().map(|c| Term { candidate: c.clone(), tangent_at: None }).collect();
         let set: Vec<usize> = (0..terms.len()).collect();
         let mut found: Option<Bend> = None;
-        let bends = candidates.iter().any(|c| BENT.contains(&c.kind));
+        let bends = candidates.iter().any(|c| c.kind.card().bends);
         let least = if bends { ROUNDS_FOR_BENT } else { 1 };
-        let loads = candidates.iter().any(Candidate::reads_torque);
+        let loads = candidates.iter().any(|c| c.kind.card().reads_torque);
         let mut loaded: Option<Vec<Signals>> = None;
         let mut round = 0;
         loop {
@@ -181,15 +165,14 @@ impl Data<'_> {
                 if let Some(next) = term.candidate.secant(&theta) {
                     term.candidate.shape = next;
                     change = change.max((next / before - 1.0).abs());
-                } else if term.candidate.has_knob() {
+                } else if let Some((low, high)) = term.candidate.kind.card().turned_by_tangent() {
                     if let (true, Some((by, rest))) = (entry.tangent, theta.split_last()) {
-                        let (low, high) = if term.candidate.kind == Kind::TorqueSaturation { LIMIT } else { KNOB };
                         let (low, high) = (low * candidates[i].shape, high * candidates[i].shape);
                         term.candidate.shape = (before + by).clamp(low, high);
                         term.tangent_at = Some(rest.to_vec());
                         change = change.max((term.candidate.shape / before - 1.0).abs());
                     } else {
-                        let one = term.candidate.kind == Kind::TorqueSaturation;
+                        let one = term.candidate.kind.card().unit_coefficient;
                         term.tangent_at = Some(if one { vec![1.0] } else { theta });
                         change = 1.0;
                     }

@@ -1,7 +1,7 @@
 //! A first look at knobs with too many places to try: only the best few go on.
 
 use crate::refine::Data;
-use gapscope_effects::{Candidate, Column, Kind, Range};
+use gapscope_effects::{Candidate, Column, Grid, Kind, Place, Range};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -17,14 +17,14 @@ const POWERS: i32 = 5;
 /// The ripples that take most out of each joint's residual (`[episode][joint][signal]`) beside a smooth function of pose
 /// and speed, beside a load on the flange, which can hide them in each joint that bears it, and beside some candidates.
 pub fn ripples(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>], beside: &[Candidate]) -> Vec<Candidate> {
-    let loads = Candidate::all(data.model).into_iter().filter(|c| c.kind == Kind::Payload);
+    let loads = Candidate::all(data.model).into_iter().filter(|c| c.kind.card().place == Place::Leaf);
     let beside: Vec<Candidate> = loads.chain(beside.iter().cloned()).collect();
     per_joint(
         data,
         ranges,
         residuals,
         &beside,
-        |j| Candidate::ripples(j, &ranges[j]),
+        |j| scanned(&Kind::ALL, j, &ranges[j]),
         |scored| {
             let mut kept: Vec<Candidate> = Vec::new();
             for candidate in scored {
@@ -46,14 +46,20 @@ pub fn places(data: &Data<'_>, ranges: &[Range], residuals: &[Vec<Vec<f64>>], be
             ranges,
             residuals,
             beside,
-            |j| Candidate::places(kind, j, &ranges[j]),
+            |j| scanned(&[kind], j, &ranges[j]),
             |mut scored| {
                 scored.truncate(PLACES);
                 scored
             },
         )
     };
-    [of(Kind::Rub), of(Kind::Catch)].concat()
+    let is_scanned = |kind: &Kind| kind.card().knob.is_some_and(|knob| matches!(knob.grid, Grid::Scanned(_)));
+    Kind::OUTSIDE.into_iter().filter(is_scanned).flat_map(of).collect()
+}
+
+/// Candidates of some kinds at a joint, of those that are looked at on a fine grid.
+fn scanned(kinds: &[Kind], joint: usize, range: &Range) -> Vec<Candidate> {
+    kinds.iter().flat_map(|&kind| Candidate::scanned(kind, joint, range)).collect()
 }
 
 /// For each joint that moves, what `keep` keeps of its candidates, the one that takes most out of the residual first.

@@ -1,6 +1,6 @@
 //! The search: which effects, at which parameters, from a first look at all of them to what the plant itself predicts.
 
-use crate::climb::{self, Choice, Competition, LATE, Rival};
+use crate::climb::{self, Choice, Competition, Rival};
 use crate::corrected::residual;
 use crate::diagnose::{Logs, Progress};
 use crate::estimate::{Fit, speeds};
@@ -85,7 +85,7 @@ impl Chosen {
     /// Whether a law in it filters what was measured and is not in another.
     pub(crate) fn filters_beyond(&self, other: &Chosen) -> bool {
         let has = |e: &Entry| other.exact.entries.iter().any(|other| other.candidate == e.candidate);
-        self.exact.entries.iter().any(|e| e.candidate.filters() && !has(e))
+        self.exact.entries.iter().any(|e| e.candidate.kind.card().filters() && !has(e))
     }
 
     /// Log probability of the account before any log is seen.
@@ -159,13 +159,15 @@ impl Logs<'_> {
         };
         let sticks = |c: usize| -> usize {
             let shapes: Vec<usize> = (0..chosen.all.entries.len())
-                .filter(|&other| of(other).kind == Kind::StribeckFriction && of(other).joints == of(c).joints)
+                .filter(|&other| {
+                    Some(of(other).kind) == of(c).kind.card().sticks_as && of(other).joints == of(c).joints
+                })
                 .collect();
             shapes.get(shapes.len() / 2).copied().unwrap_or(c)
         };
         // Pairs of what slides and what sticks.
         let pairs: Vec<(usize, usize)> = (chosen.choice.set.iter())
-            .filter(|&&c| of(c).kind == Kind::CoulombFriction && bears(c))
+            .filter(|&&c| of(c).kind.card().sticks_as.is_some() && bears(c))
             .map(|&c| (c, sticks(c)))
             .collect();
         let with = |pairs: &[(usize, usize)]| {
@@ -251,7 +253,7 @@ impl Logs<'_> {
             if let Some(rival) = rival.filter(doubtful) {
                 let mut all = chosen.all.clone();
                 // A delay and a lag are told apart by other means.
-                all.closed.extend(if LATE.contains(&kind) { LATE.to_vec() } else { vec![kind] });
+                all.closed.extend(climb::told_together(kind));
                 let choice = rival.choice.clone();
                 let next = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
                 let next = if next.turned.is_none() { self.drive(next, progress)? } else { next };
@@ -341,7 +343,7 @@ impl Logs<'_> {
         let at: Vec<usize> = at.into_iter().take(calibrated.entries.len()).collect();
         let loaded = data.loaded(&calibrated, &Fit::on_all(&calibrated, &at))?;
         let data = Data { signals: &loaded, ..data };
-        candidates.retain(|c| c.kind != Kind::TorqueSaturation || limits[c.joints[0]].contains(&c.shape));
+        candidates.retain(|c| !c.kind.card().unit_coefficient || limits[c.joints[0]].contains(&c.shape));
         let outside = Candidate::outside(self.model);
         candidates.extend(screen::ripples(&data, &ranges, &residuals, &outside));
         candidates.extend(screen::places(&data, &ranges, &residuals, &outside));
@@ -385,7 +387,7 @@ impl Logs<'_> {
             // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
             let loaded = data.loaded(&exact, &fit)?;
             let data = Data { signals: &loaded, ..data };
-            let of_load = |(_, e): &(usize, &Entry)| e.candidate.reads_torque();
+            let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind.card().reads_torque;
             let under_load = all.entries.iter().enumerate().filter(of_load);
             let changes: Vec<(usize, Candidate)> =
                 under_load.map(|(c, e)| (c, e.candidate.clone())).chain(changes).collect();
@@ -410,7 +412,7 @@ impl Logs<'_> {
 
 /// Kinds by what all of which leave rows are weighed. A push is known by when it comes: it is no outlier.
 pub(crate) fn weighing() -> Vec<Kind> {
-    [&Kind::LINEAR[..], &Kind::OUTSIDE, &LATE, &[Kind::ExternalContact]].concat()
+    Kind::ALL.into_iter().chain(Kind::OUTSIDE).filter(|kind| kind.card().weighs).collect()
 }
 
 /// The candidates of a set, a drive in the place of its rotor.

@@ -1,7 +1,7 @@
 //! Which effects were found, how sure each is, what it cannot be told from, and why.
 
 use super::Logs;
-use crate::climb::{self, LATE, Rival};
+use crate::climb::{self, Rival};
 use crate::covariance::covariance;
 use crate::estimate::{Fit, speeds};
 use crate::gap::Rows;
@@ -9,7 +9,7 @@ use crate::problem::Problem;
 use crate::schema::*;
 use crate::search::Chosen;
 use crate::verdict::Judged;
-use gapscope_effects::{Candidate, EffectError, Kind};
+use gapscope_effects::{EffectError, Kind};
 
 /// A rival as likely as this is named beside the choice.
 const WORTH_NAMING: f64 = 0.01;
@@ -47,9 +47,9 @@ impl Logs<'_> {
             let alone = change(&self.held_out_rows(problem, &own)?);
             let turned = chosen.turned.as_ref().filter(|t| t.drive.kind == kind);
             // The choice sees a drive by its rotor.
-            let seen_as = if turned.is_some() { Kind::Armature } else { kind };
+            let seen_as = turned.map_or(kind, |turned| chosen.all.entries[turned.place].candidate.kind);
             let rival = rivals.iter().find(|r| r.without == seen_as);
-            let late = chosen.late_doubt.filter(|_| LATE.contains(&kind));
+            let late = chosen.late_doubt.filter(|_| kind.card().is_late());
             let exact = chosen.needed.iter().find(|(needed, _)| *needed == kind).map(|(_, odds)| *odds);
             let odds = match turned {
                 Some(turned) => turned.odds,
@@ -69,7 +69,7 @@ impl Logs<'_> {
             let mut confused: Vec<String> =
                 near.flat_map(|r| r.instead(&chosen.all, &chosen.choice)).map(|kind| kind.name().to_owned()).collect();
             if late.is_some_and(|doubt| doubt > (-TIE).exp()) {
-                confused.extend(LATE.iter().filter(|other| **other != kind).map(|k| k.name().to_owned()));
+                confused.extend(climb::late().filter(|other| *other != kind).map(|k| k.name().to_owned()));
             }
             confused.sort();
             confused.dedup();
@@ -124,7 +124,7 @@ impl Logs<'_> {
             odds: *odds,
             taken: turned.is_some_and(|turned| turned.drive == *drive),
         }));
-        for kind in Kind::ALL.into_iter().filter(|kind| Candidate::new(*kind, Vec::new()).turns()) {
+        for kind in Kind::ALL.into_iter().filter(|kind| kind.card().turning.is_some()) {
             if !chosen.tried.iter().any(|(drive, _)| drive.kind == kind) {
                 let nothing = "a rigid drive, which leaves no more than any drive that turns on its own".into();
                 let proposed = kind.name().to_owned();

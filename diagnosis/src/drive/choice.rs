@@ -27,8 +27,8 @@ impl Logs<'_> {
         let entries = |keep: &dyn Fn(Kind) -> bool| -> Vec<usize> {
             (0..rigid.exact.entries.len()).filter(|&i| keep(rigid.exact.entries[i].candidate.kind)).collect()
         };
-        let beside = entries(&|kind| kind != Kind::Armature);
-        let bodies = entries(&|kind| kind != Kind::Armature && kind.is_calibration());
+        let beside = entries(&|kind| !kind.card().rotor);
+        let bodies = entries(&|kind| !kind.card().rotor && kind.is_calibration());
         let mut best: Option<Chosen> = None;
         let mut tried: Vec<(Candidate, f64)> = Vec::new();
         for (set, through) in [(&beside, false), (&bodies, false), (&beside, true)] {
@@ -91,7 +91,7 @@ impl Logs<'_> {
 
     /// All candidates of a choice, and among them the place of a joint's rotor, in case the choice was made without rotors.
     fn with_rotor(&self, chosen: &Chosen, joint: usize) -> (Problem, usize) {
-        let rotor = Candidate::new(Kind::Armature, vec![joint]);
+        let rotor = Candidate::rotor(joint);
         let entries = &chosen.all.entries;
         if let Some(place) = entries.iter().position(|e| e.candidate == rotor) {
             return (chosen.all.clone(), place);

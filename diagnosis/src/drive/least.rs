@@ -5,17 +5,12 @@
 //! held against the bar of the search itself.
 
 use super::choice::MORE_THAN_NOISE;
-use super::{FILTERED, Rigid, Runs, SOFTEST, STIFFEST, Study, beyond_doubt, dot, mean, tells};
+use super::{Rigid, Runs, Study, beyond_doubt, dot, mean, tells, turning};
 use crate::diagnose::Logs;
 use crate::estimate::Fit;
 use crate::problem::Problem;
-use gapscope_effects::{Candidate, EffectError, EncoderSide, Kind};
+use gapscope_effects::{Candidate, EffectError, EncoderSide, Kind, Turning};
 use rayon::prelude::*;
-
-/// Gaps that are tried, rad or m, from the least on.
-const GAP: (f64, f64) = (1e-4, 0.3);
-/// From one knob to the next, relative.
-const STEP: f64 = 1.15;
 
 /// The least spring or play of one joint.
 #[derive(Debug, Clone)]
@@ -40,7 +35,7 @@ impl Logs<'_> {
     ) -> Result<Vec<Least>, EffectError> {
         let rigid = |c: &usize| {
             let candidate = &problem.entries[*c].candidate;
-            candidate.kind != Kind::Armature && !candidate.turns()
+            !candidate.kind.card().rotor && !candidate.turns()
         };
         let others = Fit { set: fit.set.iter().copied().filter(rigid).collect(), ..fit.clone() };
         let runs = self.joint_runs(problem, &others)?;
@@ -51,15 +46,14 @@ impl Logs<'_> {
                 study.through = through;
                 study.least(kind, side, noise[j])
             };
-            let play = least(Kind::Backlash, false);
-            // As they are, and through a filter: the stiffer of the two is the less.
-            let springs = [false, true].map(|through| least(Kind::JointElasticity, through));
-            let spring = springs.into_iter().flatten().max_by(|a, b| a.0.shape.total_cmp(&b.0.shape));
-            [(Kind::JointElasticity, spring), (Kind::Backlash, play)].map(|(kind, drive)| Least {
-                kind,
-                joint: j,
-                drive,
-            })
+            let mut of = |(kind, turning): (Kind, Turning)| {
+                // As they are, and through a filter: that which comes first on the ladder is the less.
+                let (first, ..) = turning.ladder;
+                let drives = [false, true].map(|through| least(kind, through)).into_iter().flatten();
+                let far = |drive: &(Candidate, f64)| (drive.0.shape / first).ln().abs();
+                Least { kind, joint: j, drive: drives.min_by(|a, b| far(a).total_cmp(&far(b))) }
+            };
+            turning().map(&mut of).collect::<Vec<_>>()
         };
         Ok((0..self.model.dof()).into_par_iter().flat_map_iter(of_joint).collect())
     }
@@ -70,13 +64,11 @@ impl Study<'_> {
     /// where no rotor shows, without which neither does anything to the torque.
     fn least(&self, kind: Kind, side: EncoderSide, floor: f64) -> Option<(Candidate, f64)> {
         let rotor = self.rotor;
-        if !self.shows(rotor) || (self.through && (kind, side) != FILTERED) {
+        let turning = kind.card().turning?;
+        if !self.shows(rotor) || (self.through && turning.filtered != Some(side)) {
             return None;
         }
-        let (first, last, by) = match kind {
-            Kind::JointElasticity => (STIFFEST, SOFTEST, 1.0 / STEP),
-            _ => (GAP.0, GAP.1, STEP),
-        };
+        let (first, last, by) = turning.ladder;
         let knobs =
             (0..).map(|i| first * by.powi(i)).take_while(|knob| if by > 1.0 { *knob <= last } else { *knob >= last });
         let at = |shape| Candidate { shape, side, inertia: self.inertia, ..Candidate::new(kind, vec![self.joint]) };
@@ -106,7 +98,7 @@ impl Study<'_> {
         let view = self.view(drive, rotor);
         let difference = |of: Runs| -> Vec<f64> {
             let mut own = self.at_rows(view, |e| self.run(of, e).hidden_by(drive, rotor));
-            if drive.kind == Kind::Backlash {
+            if drive.kind.card().turning.is_some_and(|turning| turning.closes) {
                 // Its contact is a spring, with or without a gap.
                 let closed = Candidate { shape: 0.0, ..drive.clone() };
                 let contact = self.at_rows(view, |e| self.run(of, e).hidden_by(&closed, rotor));

@@ -4,7 +4,7 @@ use super::Term;
 use crate::band::Band;
 use crate::signals::Signals;
 use gapscope_dynamics::Model;
-use gapscope_effects::{Candidate, Column, Kind};
+use gapscope_effects::{Candidate, Column};
 use rayon::prelude::*;
 
 /// Candidates whose columns stay, with those columns at the rows of a band.
@@ -16,7 +16,10 @@ impl Known {
     pub fn new(model: &Model, signals: &[Signals], band: &Band, standstill: &[f64], moving: &[bool]) -> Known {
         let stays = |c: &Candidate| {
             // A push is known by when it comes, and that is found later.
-            c.shape == 0.0 && !c.has_knob() && !c.reads_torque() && c.kind != Kind::ExternalContact
+            c.shape == 0.0
+                && c.kind.card().turned_by_tangent().is_none()
+                && !c.kind.card().reads_torque
+                && !c.kind.card().of_its_log
         };
         let mut candidates = Candidate::all(model);
         candidates.retain(|c| stays(c) && c.joints.iter().all(|&j| moving[j]));
@@ -62,6 +65,7 @@ mod tests {
     use super::*;
     use crate::signals::standstill;
     use crate::support;
+    use gapscope_effects::Kind;
 
     #[test]
     fn known_columns_are_those_of_a_problem_without_them() {

@@ -241,7 +241,7 @@ impl Problem {
 
     /// Columns of a set of candidates, the alignment first, unless an effect of the set says how late the effort acts.
     pub fn columns(&self, set: &[usize]) -> Vec<usize> {
-        let late = |&c: &usize| matches!(self.entries[c].candidate.kind, Kind::ActuationDelay | Kind::ActuatorLag);
+        let late = |&c: &usize| self.entries[c].candidate.kind.card().is_late();
         let alignment = (!set.iter().any(late)).then_some(0);
         alignment.into_iter().chain(set.iter().flat_map(|&c| self.entries[c].columns.clone())).collect()
     }

@@ -2,7 +2,7 @@
 
 use crate::break_away::Held;
 use gapscope_dynamics::Model;
-use gapscope_effects::{Candidate, Column, Effect, Kind, Motion};
+use gapscope_effects::{Candidate, Column, Effect, Motion};
 use std::ops::Range;
 
 /// One candidate with the columns that it owns in the problem.
@@ -14,7 +14,7 @@ pub struct Entry {
     pub columns: Range<usize>,
     /// Whether the last column is the tangent of the knob, its coefficient the change of the knob.
     pub tangent: bool,
-    /// For Stribeck friction, what it held at rest in each fold, where that was seen.
+    /// For a friction that rises towards rest, what it held at rest in each fold, where that was seen.
     pub held: Vec<Option<Held>>,
 }
 
@@ -29,11 +29,11 @@ impl Entry {
             _ => self.candidate.effects(model, theta),
         };
         for effect in &mut effects {
-            if let (Effect::StribeckFriction(friction), Some(held)) = (effect, self.held(without)) {
+            if let (Some(friction), Some(held)) = (effect.at_rest(), self.held(without)) {
                 let likely = held.torque..=held.torque + held.doubt;
-                for (joint, at_rest) in &mut friction.r#static {
+                for (joint, at_rest) in friction.at_rest {
                     // A joint that was not pushed to where it slides tells nothing by its rest.
-                    let pushed = friction.coulomb.get(joint).is_some_and(|slides| held.torque > *slides);
+                    let pushed = friction.sliding.get(joint).is_some_and(|slides| held.torque > *slides);
                     *at_rest = if pushed && !likely.contains(at_rest) { held.torque } else { *at_rest };
                 }
             }
@@ -41,7 +41,7 @@ impl Entry {
         effects
     }
 
-    /// The most that Stribeck friction held at rest, as seen without one fold or with all.
+    /// The most that a friction held at rest, as seen without one fold or with all.
     pub fn held(&self, without: Option<usize>) -> Option<Held> {
         let seen = self.held.iter().enumerate().filter(|&(fold, _)| without != Some(fold));
         seen.filter_map(|(_, held)| *held).max_by(|a, b| a.torque.total_cmp(&b.torque))
@@ -69,7 +69,7 @@ impl Term {
                 at_least: -KNOB_CHANGE * self.candidate.shape,
                 at_most: KNOB_CHANGE * self.candidate.shape,
             };
-            if self.candidate.kind == Kind::TorqueSaturation {
+            if self.candidate.kind.card().unit_coefficient {
                 // A limit cuts all that is beyond it.
                 (columns[0].at_least, columns[0].at_most) = (1.0, 1.0);
             }

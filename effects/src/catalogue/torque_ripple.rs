@@ -3,12 +3,15 @@
 //! M q̈ + C q̇ + g = τ + amplitude · sin(cycles · q + phase).
 //! Source: Holtz, Springob, IEEE Trans. Industrial Electronics 43(2) 1996 (position-periodic torque harmonics).
 
-use crate::effect::{Law, Value, check, per_joint, value_at};
+use crate::candidate::Range;
+use crate::card::{Card, FIVEFOLD, Gauge, Grid, Knob, Size};
+use crate::law::{Law, Listed, Signature, Value, check, per_joint, value_at};
 use crate::plant::Ripple;
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 /// A sine of the joint's position.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -53,8 +56,50 @@ impl Law for TorqueRipple {
     }
 }
 
+impl Signature for TorqueRipple {
+    const CARD: Card = Card {
+        words: "torque ripple",
+        meaning: "effort that repeats with position: cogging or gear mesh",
+        knob: Some(Knob { what: "cycles, 1/turn (rad/m)", grid: Grid::Scanned(cycles), turned: FIVEFOLD }),
+        size: Size::Along(&[Gauge::along("amplitude", &[1.0, 0.0])]),
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j, candidate.shape))
+    }
+}
+
+impl Listed for TorqueRipple {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<TorqueRipple> {
+        let &[cosine, sine] = coefficients else { return None };
+        Some(TorqueRipple {
+            amplitude: candidate.each(model, cosine.hypot(sine)),
+            cycles: candidate.each(model, candidate.shape),
+            phase: candidate.each(model, sine.atan2(cosine)),
+        })
+    }
+
+    fn absorb(&mut self, other: TorqueRipple) -> Option<TorqueRipple> {
+        self.amplitude.extend(other.amplitude);
+        self.cycles.extend(other.cycles);
+        self.phase.extend(other.phase);
+        None
+    }
+}
+
+/// Cycles that are looked at: at least one and a half over the span; above that by this part of what the span resolves.
+const CYCLES: (f64, f64, usize) = (1.5, 0.35, 60);
+
+/// Cycles on a grid, fine enough that none falls between.
+fn cycles(range: &Range) -> Vec<f64> {
+    let turn = TAU / range.span;
+    let (least, step, count) = CYCLES;
+    (0..count).map(|i| (least + step * i as f64) * turn).filter(|cycles| cycles.is_finite()).collect()
+}
+
 /// Two columns at a number of cycles: −sin and −cos of cycles · q. Coefficients: amplitude · cos phase, amplitude · sin phase.
-pub(crate) fn signature(motion: &Motion, joint: usize, cycles: f64) -> Vec<Column> {
+fn signature(motion: &Motion, joint: usize, cycles: f64) -> Vec<Column> {
     let wave = |f: fn(f64) -> f64| motion.q[joint].iter().map(|q| -f(cycles * q)).collect();
     [wave(f64::sin), wave(f64::cos)].into_iter().map(|x| Column::on(joint, x, f64::NEG_INFINITY)).collect()
 }

@@ -4,10 +4,11 @@
 //! Source: Bittencourt, Gunnarsson, ASME J. Dyn. Sys. 134(5) 2012 (friction of a joint against load and temperature); the
 //! exponential is that of a drive that warms up as one heat capacity.
 
-use crate::effect::{Law, Value, check, per_joint, value_at};
+use crate::card::{Card, FIVEFOLD, FRICTION_EXACT_TO, Force, Gauge, Grid, Knob, Size};
+use crate::law::{Law, Listed, Signature, Value, check, per_joint, value_at};
 use crate::motion::soft_sign;
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -57,8 +58,49 @@ impl Law for ThermalDrift {
     }
 }
 
+impl Signature for ThermalDrift {
+    const CARD: Card = Card {
+        words: "thermal drift",
+        meaning: "friction that falls as the drive warms up",
+        knob: Some(Knob {
+            what: "time constant, s",
+            grid: Grid::OfJoint(|range| TIMES.map(|part| part * range.duration).to_vec()),
+            turned: FIVEFOLD,
+        }),
+        force: Some(Force::Dry),
+        size: Size::Along(&[Gauge::along("coulomb", &[0.0, 1.0])]),
+        exact_to: FRICTION_EXACT_TO,
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j, candidate.shape))
+    }
+}
+
+impl Listed for ThermalDrift {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<ThermalDrift> {
+        let &[warm, cold] = coefficients else { return None };
+        (warm + cold > 0.0).then(|| ThermalDrift {
+            coulomb: candidate.each(model, warm + cold),
+            ratio: candidate.each(model, warm / (warm + cold)),
+            time_constant: candidate.each(model, candidate.shape),
+        })
+    }
+
+    fn absorb(&mut self, other: ThermalDrift) -> Option<ThermalDrift> {
+        self.coulomb.extend(other.coulomb);
+        self.ratio.extend(other.ratio);
+        self.time_constant.extend(other.time_constant);
+        None
+    }
+}
+
+/// Time constants over the longest episode that are tried first.
+const TIMES: [f64; 5] = [0.06, 0.15, 0.35, 0.8, 2.0];
+
 /// Two columns at a time constant: sign q̇, and the same fading with time. Coefficients: ratio · f, (1 − ratio) f.
-pub(crate) fn signature(motion: &Motion, joint: usize, time_constant: f64) -> Vec<Column> {
+fn signature(motion: &Motion, joint: usize, time_constant: f64) -> Vec<Column> {
     let standstill = motion.standstill[joint];
     let sign: Vec<f64> = motion.v[joint].iter().map(|&v| soft_sign(v, standstill)).collect();
     let time = |k: usize| motion.start + k as f64 * motion.dt;

@@ -3,10 +3,11 @@
 //! With s = q̇_a + ratio · q̇_b the force F = −(viscous s + coulomb sign s + armature ṡ) acts as F on joint a and ratio · F on joint b.
 //! Source: Gautier, Janot, Vandanjon, IEEE Trans. Control Systems Technology 21(2) 2013, eq. 26 (coupling of joints 5 and 6 of a TX40).
 
-use crate::effect::{Law, Value, check};
+use crate::card::{Card, FRICTION_EXACT_TO, Gauge, Grid, Knob, Place, Size, Turned};
+use crate::law::{Law, Listed, Signature, Value, check};
 use crate::motion::soft_sign;
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Model;
 use serde::{Deserialize, Serialize};
 
 /// A drive element that turns with a combination of two joints.
@@ -67,8 +68,42 @@ impl Law for JointCoupling {
     }
 }
 
+impl Signature for JointCoupling {
+    const CARD: Card = Card {
+        words: "joint coupling",
+        meaning: "friction or inertia on a sum of two joint speeds",
+        place: Place::Pair,
+        knob: Some(Knob {
+            what: "weight of the second joint",
+            grid: Grid::Fixed(|| vec![1.0, -1.0]),
+            turned: Turned::Not,
+        }),
+        size: Size::Along(&[Gauge::along("coulomb", &[0.0, 1.0, 0.0])]),
+        exact_to: FRICTION_EXACT_TO,
+        weighs: true,
+        // It may have friction without inertia.
+        optional_parts: true,
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        match candidate.joints[..] {
+            [a, b] => signature(motion, [a, b], candidate.shape),
+            _ => Vec::new(),
+        }
+    }
+}
+
+impl Listed for JointCoupling {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<JointCoupling> {
+        let (&[a, b], &[viscous, coulomb, armature]) = (&candidate.joints[..], coefficients) else { return None };
+        let joints = [a, b].map(|j| model.joints()[j].name.clone());
+        Some(JointCoupling { joints, ratio: candidate.shape, coulomb, viscous, armature })
+    }
+}
+
 /// Three columns: s, sign s and ṡ, on both joints. Coefficients: viscous, coulomb, armature.
-pub(crate) fn signature(motion: &Motion, [a, b]: [usize; 2], ratio: f64) -> Vec<Column> {
+fn signature(motion: &Motion, [a, b]: [usize; 2], ratio: f64) -> Vec<Column> {
     let sum = |x: &[Vec<f64>]| -> Vec<f64> { x[a].iter().zip(&x[b]).map(|(xa, xb)| xa + ratio * xb).collect() };
     let speed = sum(motion.v);
     let standstill = motion.standstill[a] + ratio.abs() * motion.standstill[b];

@@ -3,10 +3,11 @@
 //! τ_effective(t) = τ(t − delay), τ held between samples; a fraction of a sample is allowed.
 //! Source: Åström, Wittenmark, Computer-Controlled Systems (1997) (sampling a system with a time delay).
 
-use crate::effect::{Law, Value, check};
-use crate::filter::early;
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
+use crate::card::{Card, Force, Gauge, LATE, LATE_EXACT_TO, LATE_SPREAD, Place, Size};
+use crate::filter::{delayed, early};
+use crate::law::{Law, Listed, Signature, Value, check};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Model;
 use serde::{Deserialize, Serialize};
 
 /// The time between an effort's stamp in the log and its action.
@@ -37,9 +38,41 @@ impl Law for ActuationDelay {
     }
 }
 
+impl Signature for ActuationDelay {
+    const CARD: Card = Card {
+        words: "actuation delay",
+        meaning: "effort acts later than logged",
+        place: Place::Robot,
+        knob: Some(LATE),
+        force: Some(Force::Late),
+        size: Size::Along(&[Gauge::along("delay", &[1.0])]),
+        exact_to_samples: LATE_EXACT_TO,
+        reads_torque: true,
+        on_effort: true,
+        passes: Some(delayed),
+        weighs: true,
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        signature(motion, candidate.shape)
+    }
+
+    fn scales(_candidate: &Candidate, _model: &Model) -> Option<Vec<f64>> {
+        Some(vec![LATE_SPREAD])
+    }
+}
+
+impl Listed for ActuationDelay {
+    fn from_coefficients(_candidate: &Candidate, _model: &Model, coefficients: &[f64]) -> Option<ActuationDelay> {
+        let &[delay] = coefficients else { return None };
+        Some(ActuationDelay { delay })
+    }
+}
+
 /// One column at a delay: the torque that the motion takes, as much later, less that of now, over the delay, on every joint.
 /// Coefficient: the delay.
-pub(crate) fn signature(motion: &Motion, delay: f64) -> Vec<Column> {
+fn signature(motion: &Motion, delay: f64) -> Vec<Column> {
     let change =
         |x: &Vec<f64>| early(x, delay, motion.dt).iter().zip(x).map(|(then, now)| (then - now) / delay).collect();
     let rows = motion.taken.iter().map(change).enumerate().collect();

@@ -3,10 +3,11 @@
 //! M q̈ + C q̇ + g = τ − [f + (s − f) e^{−(q̇/v)²}] sign q̇ in motion; at rest any force in [−s, s] that keeps the joint at rest.
 //! Source: Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7) 1994, section 2 (Stribeck curve; here with exponent 2).
 
-use crate::effect::{Law, Value, check, per_joint, value_at};
+use crate::card::{Card, FIVEFOLD, FRICTION_EXACT_TO, Force, Gauge, Grid, Knob, Size};
+use crate::law::{AtRest, Law, Listed, Signature, Value, check, per_joint, value_at};
 use crate::motion::soft_sign;
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -53,10 +54,56 @@ impl Law for StribeckFriction {
         }
         Ok(())
     }
+
+    fn at_rest(&mut self) -> Option<AtRest<'_>> {
+        Some(AtRest { sliding: &self.coulomb, at_rest: &mut self.r#static })
+    }
 }
 
+impl Signature for StribeckFriction {
+    const CARD: Card = Card {
+        words: "Stribeck friction",
+        meaning: "dry friction that rises towards standstill",
+        knob: Some(Knob {
+            what: "Stribeck velocity, rad/s (m/s)",
+            grid: Grid::OfJoint(|range| VELOCITIES.map(|part| part * range.speed).to_vec()),
+            turned: FIVEFOLD,
+        }),
+        force: Some(Force::Dry),
+        size: Size::Along(&[Gauge { beside_others: true, ..Gauge::along("static", &[0.0, 1.0]) }]),
+        exact_to: FRICTION_EXACT_TO,
+        at_rest: Some(["coulomb", "static"]),
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j, candidate.shape))
+    }
+}
+
+impl Listed for StribeckFriction {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<StribeckFriction> {
+        let &[coulomb, rise] = coefficients else { return None };
+        Some(StribeckFriction {
+            coulomb: candidate.each(model, coulomb),
+            r#static: candidate.each(model, coulomb + rise),
+            stribeck_velocity: candidate.each(model, candidate.shape),
+        })
+    }
+
+    fn absorb(&mut self, other: StribeckFriction) -> Option<StribeckFriction> {
+        self.coulomb.extend(other.coulomb);
+        self.r#static.extend(other.r#static);
+        self.stribeck_velocity.extend(other.stribeck_velocity);
+        None
+    }
+}
+
+/// Stribeck velocities over the joint's top speed that are tried first.
+const VELOCITIES: [f64; 5] = [0.03, 0.06, 0.12, 0.25, 0.5];
+
 /// Two columns at a Stribeck velocity: sign q̇, and the same fading with speed. Coefficients: f, s − f.
-pub(crate) fn signature(motion: &Motion, joint: usize, velocity: f64) -> Vec<Column> {
+fn signature(motion: &Motion, joint: usize, velocity: f64) -> Vec<Column> {
     let standstill = motion.standstill[joint];
     let sign: Vec<f64> = motion.v[joint].iter().map(|&v| soft_sign(v, standstill)).collect();
     let rise: Vec<f64> = sign.iter().zip(&motion.v[joint]).map(|(s, v)| s * (-(v / velocity).powi(2)).exp()).collect();

@@ -3,10 +3,10 @@
 //! measured = true + offset. Positions of the plant's state are measured ones; the physics takes the offset off.
 //! Source: Mooring, Roth, Driels, Fundamentals of Manipulator Calibration (1991) (joint offsets).
 
-use crate::effect::{Law, Value, check, per_joint};
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
-use gapscope_dynamics::Data;
+use crate::card::{Card, Gauge, Size};
+use crate::law::{Law, Listed, Signature, Value, check, per_joint};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::{Data, Model};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -41,12 +41,45 @@ impl Law for JointZeroOffset {
     }
 }
 
+impl Signature for JointZeroOffset {
+    const CARD: Card = Card {
+        words: "encoder zero offset",
+        meaning: "the encoder's zero is off",
+        size: Size::Along(&[Gauge::along("offset", &[1.0])]),
+        bends: true,
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j))
+    }
+
+    fn scales(_candidate: &Candidate, _model: &Model) -> Option<Vec<f64>> {
+        Some(vec![SPREAD])
+    }
+}
+
+impl Listed for JointZeroOffset {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<JointZeroOffset> {
+        let &[value] = coefficients else { return None };
+        Some(JointZeroOffset { offset: candidate.each(model, value) })
+    }
+
+    fn absorb(&mut self, other: JointZeroOffset) -> Option<JointZeroOffset> {
+        self.offset.extend(other.offset);
+        None
+    }
+}
+
+/// Plausible offset, rad or m: a standard deviation.
+const SPREAD: f64 = 0.05;
+
 /// Step of the derivative, rad or m.
 const STEP: f64 = 1e-4;
 
 /// One column: the negative derivative of the nominal torque with respect to the joint's position, on every joint.
 /// Coefficient: the offset. Exact to first order in the offset.
-pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
+fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     let ahead = vec![STEP; motion.len()];
     let still = vec![0.0; motion.len()];
     vec![moved(motion, joint, [&ahead, &still, &still], 1.0 / STEP, f64::NEG_INFINITY)]

@@ -3,10 +3,10 @@
 //! Gravity in the base's frame is 9.81 · (sin pitch, −sin roll cos pitch, −cos roll cos pitch) instead of (0, 0, −9.81).
 //! Source: the gravity term of inverse dynamics, Featherstone, Rigid Body Dynamics Algorithms (2008), section 5.3.
 
-use crate::effect::{Law, Value, check};
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
-use gapscope_dynamics::Data;
+use crate::card::{Apart, Card, Gauge, Place, Size};
+use crate::law::{Law, Listed, Signature, Value, check};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::{Data, Model};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -54,10 +54,45 @@ impl Law for GravityMisalignment {
     }
 }
 
+impl Signature for GravityMisalignment {
+    const CARD: Card = Card {
+        words: "tilted base",
+        meaning: "the base is not level, so gravity points elsewhere",
+        place: Place::Robot,
+        size: Size::Along(&[Gauge::along("roll", &[0.0, 1.0]), Gauge::along("pitch", &[1.0, 0.0])]),
+        apart: Apart::By(
+            3,
+            "log with the base turned about the vertical: what a tilt does changes, what belongs to a joint stays",
+        ),
+        bends: true,
+        weighs: true,
+        common: true,
+        ..Card::BLANK
+    };
+
+    fn columns(_candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        signature(motion)
+    }
+
+    fn scales(_candidate: &Candidate, _model: &Model) -> Option<Vec<f64>> {
+        Some(vec![TILT * G; 2])
+    }
+}
+
+impl Listed for GravityMisalignment {
+    fn from_coefficients(_candidate: &Candidate, _model: &Model, coefficients: &[f64]) -> Option<GravityMisalignment> {
+        let &[x, y] = coefficients else { return None };
+        from_coefficients(x, y)
+    }
+}
+
+/// Tilt of a base that is plausible, rad: a standard deviation.
+const TILT: f64 = 0.05;
+
 /// Two columns: torque of one m/s² of gravity along x and along y of the base. Coefficients: those components of gravity.
 ///
 /// Along z gravity changes by second order only, g (1 − cos), which the fit leaves out.
-pub(crate) fn signature(motion: &Motion) -> Vec<Column> {
+fn signature(motion: &Motion) -> Vec<Column> {
     let n = motion.model.dof();
     let mut data = Data::new(motion.model);
     let (mut q, mut torque) = (vec![0.0; n], vec![0.0; n]);
@@ -81,7 +116,7 @@ pub(crate) fn signature(motion: &Motion) -> Vec<Column> {
 }
 
 /// The tilt whose gravity has these components along x and y of the base; `None` beyond a right angle.
-pub(crate) fn from_coefficients(gx: f64, gy: f64) -> Option<GravityMisalignment> {
+fn from_coefficients(gx: f64, gy: f64) -> Option<GravityMisalignment> {
     let pitch = (gx / G).clamp(-1.0, 1.0).asin();
     let sine = -gy / (G * pitch.cos());
     (sine.abs() < 1.0 && gx.abs() < G).then(|| GravityMisalignment { roll: sine.asin(), pitch })

@@ -3,9 +3,10 @@
 //! τ_effective = τ + bias.
 //! Source: Janot, Vandanjon, Gautier, IEEE Trans. Control Systems Technology 22(1) 2014, eq. 3 (offset of the drive).
 
-use crate::effect::{Law, Value, check, per_joint};
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
+use crate::card::{Axis, Card, Force, Gauge, Part, Size};
+use crate::law::{Law, Listed, Signature, Value, check, per_joint};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -40,7 +41,37 @@ impl Law for TorqueBias {
     }
 }
 
+impl Signature for TorqueBias {
+    const CARD: Card = Card {
+        words: "torque bias",
+        meaning: "a constant effort is added to the one logged",
+        part: Part::Calibration,
+        force: Some(Force::Constant),
+        size: Size::Along(&[Gauge::along("bias", &[1.0])]),
+        axis: Axis::Position,
+        weighs: true,
+        common: true,
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j))
+    }
+}
+
+impl Listed for TorqueBias {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<TorqueBias> {
+        let &[value] = coefficients else { return None };
+        Some(TorqueBias { bias: candidate.each(model, value) })
+    }
+
+    fn absorb(&mut self, other: TorqueBias) -> Option<TorqueBias> {
+        self.bias.extend(other.bias);
+        None
+    }
+}
+
 /// One column: minus one. Coefficient: bias.
-pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
+fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     vec![Column::on(joint, vec![-1.0; motion.len()], f64::NEG_INFINITY)]
 }

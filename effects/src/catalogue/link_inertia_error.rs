@@ -3,8 +3,10 @@
 //! The link's ten inertial parameters become π + Δπ; inverse dynamics is linear in them.
 //! Source: Atkeson, An, Hollerbach, Int. J. Robotics Research 5(3) 1986, eq. 12.
 
-use crate::effect::{Law, Value, check};
-use crate::{EffectError, Kind, Plant};
+use super::payload::signature;
+use crate::card::{Card, Part, Place, Size};
+use crate::law::{Law, Listed, Signature, Value, check};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
 use gapscope_dynamics::{Inertia, InertialSource, Model};
 use serde::{Deserialize, Serialize};
 
@@ -63,6 +65,36 @@ impl Law for LinkInertiaError {
     }
 }
 
+impl Signature for LinkInertiaError {
+    const CARD: Card = Card {
+        words: "link mass or inertia error",
+        meaning: "a link's mass, centre of mass or inertia differs from the URDF",
+        part: Part::Calibration,
+        place: Place::Link,
+        size: Size::PointMass("mass_delta"),
+        body: true,
+        described: true,
+        weighs: true,
+        common: true,
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j))
+    }
+
+    fn scales(candidate: &Candidate, model: &Model) -> Option<Vec<f64>> {
+        candidate.joint().map(|j| scales(model, j))
+    }
+}
+
+impl Listed for LinkInertiaError {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<LinkInertiaError> {
+        let (&j, parameters) = candidate.joints.first().zip(coefficients.try_into().ok())?;
+        Some(from_coefficients(&model.joints()[j].name, parameters))
+    }
+}
+
 impl LinkInertiaError {
     /// The ten parameters in the order of the regressor.
     pub(crate) fn coefficients(&self) -> [f64; 10] {
@@ -86,7 +118,7 @@ const LEAST: f64 = 0.01;
 
 /// Plausible sizes of the ten coefficients, standard deviations about the URDF: kg, kg m, kg m².
 /// A mass that is off is so at its lever; the centre moves the inertia as well.
-pub(crate) fn scales(model: &Model, joint: usize) -> Vec<f64> {
+fn scales(model: &Model, joint: usize) -> Vec<f64> {
     let total: f64 = model.joints().iter().map(|j| j.inertia.mass).sum();
     let body = &model.joints()[joint].inertia;
     let mass = body.mass.max(LEAST * total);
@@ -103,7 +135,7 @@ pub(crate) fn scales(model: &Model, joint: usize) -> Vec<f64> {
 }
 
 /// The error with these ten coefficients of the link's regressor.
-pub(crate) fn from_coefficients(joint: &str, c: &[f64; 10]) -> LinkInertiaError {
+fn from_coefficients(joint: &str, c: &[f64; 10]) -> LinkInertiaError {
     LinkInertiaError {
         joint: joint.to_owned(),
         mass_delta: c[0],

@@ -4,9 +4,9 @@
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 7.2.2;
 //! physical consistency: Wensing, Kim, Slotine, IEEE RA-L 3(1) 2018.
 
-use crate::effect::{Law, Value, check};
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
+use crate::card::{Apart, Card, Place, Size};
+use crate::law::{Law, Listed, Signature, Value, check};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
 use gapscope_dynamics::{Data, Inertia, Model};
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, Matrix3};
@@ -69,8 +69,38 @@ impl Law for Payload {
     }
 }
 
+impl Signature for Payload {
+    const CARD: Card = Card {
+        words: "payload",
+        meaning: "a body at the flange that the model does not carry",
+        place: Place::Leaf,
+        size: Size::PointMass("mass"),
+        apart: Apart::By(1, "log without the load, or weigh it"),
+        bends: true,
+        body: true,
+        weighs: true,
+        common: true,
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j))
+    }
+
+    fn scales(_candidate: &Candidate, model: &Model) -> Option<Vec<f64>> {
+        Some(scales(model))
+    }
+}
+
+impl Listed for Payload {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<Payload> {
+        let (&j, parameters) = candidate.joints.first().zip(coefficients.try_into().ok())?;
+        from_coefficients(&model.joints()[j].name, parameters)
+    }
+}
+
 /// Ten columns: the regressor of the link. Coefficients: m, m c (3), inertia about the link's origin (xx, xy, yy, xz, yz, zz).
-pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
+pub(super) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     let n = motion.model.dof();
     let mut data = Data::new(motion.model);
     let mut regressor = DMatrix::zeros(n, 10 * n);
@@ -106,7 +136,7 @@ const MASS: f64 = 0.2;
 const LEVER: f64 = 0.15;
 
 /// Plausible sizes of the ten coefficients, standard deviations about no payload: kg, kg m, kg m².
-pub(crate) fn scales(model: &Model) -> Vec<f64> {
+fn scales(model: &Model) -> Vec<f64> {
     let mass = MASS * model.joints().iter().map(|j| j.inertia.mass).sum::<f64>();
     [&[mass][..], &[mass * LEVER; 3], &[mass * LEVER * LEVER; 6]].concat()
 }
@@ -116,7 +146,7 @@ pub(crate) fn scales(model: &Model) -> Vec<f64> {
 ///
 /// The data determine mass and first moment well and inertia badly, so inertia alone is moved to where it is physical:
 /// the principal moments become what a density that is nowhere negative can have.
-pub(crate) fn from_coefficients(joint: &str, parameters: &[f64; 10]) -> Option<Payload> {
+fn from_coefficients(joint: &str, parameters: &[f64; 10]) -> Option<Payload> {
     let missing = parameters[0] < 0.0;
     let inertia = Inertia::from_parameters(&parameters.map(|p| if missing { -p } else { p }));
     let h = inertia.first_moment;

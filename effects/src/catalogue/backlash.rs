@@ -7,8 +7,11 @@
 //! link gets the effort. The stiffness of the contact is that of [`crate::JointElasticity`] on the same joint, else one at
 //! which the link alone, at the middle of its range, would vibrate at 20 Hz on the locked motor.
 
-use crate::effect::{Law, Value, check, per_joint};
-use crate::{EffectError, Kind, Plant};
+use super::armature::Armature;
+use crate::card::{Card, Turning};
+use crate::law::{Law, Listed, Signature, Value, check, per_joint};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -40,5 +43,42 @@ impl Law for Backlash {
             plant.drive(j).half_gap += 0.5 * gap;
         }
         Ok(())
+    }
+}
+
+impl Signature for Backlash {
+    const CARD: Card = Card {
+        words: "backlash",
+        meaning: "play between motor and link",
+        bends: true,
+        turning: Some(Turning {
+            // Gaps, rad or m: the basin of the true one is narrow.
+            first: &[0.0004, 0.0008, 0.0016, 0.003, 0.0045, 0.0065, 0.0095, 0.013, 0.018, 0.025, 0.035, 0.05, 0.07],
+            possible: (0.0, f64::INFINITY),
+            widest: 0.15,
+            power: 1.0,
+            ladder: (1e-4, 0.3, 1.15),
+            filtered: None,
+            closes: true,
+            jolts: true,
+            parameter: ("gap", ["rad", "m"]),
+        }),
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        Armature::columns(candidate, motion)
+    }
+}
+
+impl Listed for Backlash {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<Backlash> {
+        let &[rotor] = coefficients else { return None };
+        (rotor >= 0.0).then(|| Backlash { gap: candidate.each(model, candidate.shape) })
+    }
+
+    fn absorb(&mut self, other: Backlash) -> Option<Backlash> {
+        self.gap.extend(other.gap);
+        None
     }
 }

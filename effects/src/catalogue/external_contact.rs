@@ -3,11 +3,11 @@
 //! M q̈ + C q̇ + g = τ + Jᵀ F inside the intervals, J the Jacobian of the link's centre of mass.
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 7.2 (contact forces in joint space).
 
-use crate::effect::{Law, Value, check};
+use crate::card::{Apart, Card, Place};
+use crate::law::{Law, Listed, Signature, Value, check};
 use crate::plant::Contact;
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
-use gapscope_dynamics::Data;
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::{Data, Model};
 use glam::DVec3;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -53,9 +53,33 @@ impl Law for ExternalContact {
     }
 }
 
+impl Signature for ExternalContact {
+    const CARD: Card = Card {
+        words: "external contact",
+        meaning: "an outside force for some of the time",
+        place: Place::Leaf,
+        apart: Apart::By(4, "log again with nothing touching the robot"),
+        weighs: true,
+        of_its_log: true,
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j))
+    }
+}
+
+impl Listed for ExternalContact {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<ExternalContact> {
+        let &[x, y, z] = coefficients else { return None };
+        let link = candidate.joints.first().map(|&j| model.joints()[j].name.clone()).unwrap_or_default();
+        Some(ExternalContact { link, intervals: Vec::new(), force: [x, y, z] })
+    }
+}
+
 /// Three columns: what a unit force along x, y and z of the world at the link's centre of mass adds while it pushes, on
 /// every joint. Coefficients: the force.
-pub(crate) fn signature(motion: &Motion, link: usize) -> Vec<Column> {
+fn signature(motion: &Motion, link: usize) -> Vec<Column> {
     let n = motion.model.dof();
     let mut data = Data::new(motion.model);
     let mut jacobian = DMatrix::zeros(6, n);

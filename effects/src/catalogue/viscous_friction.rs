@@ -3,9 +3,10 @@
 //! Joint space, n joints: M q̈ + C q̇ + g = τ − b q̇.
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), eq. 7.21.
 
-use crate::effect::{Law, Value, check, per_joint};
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
+use crate::card::{Axis, Card, FRICTION_EXACT_TO, Gauge, Part, Size};
+use crate::law::{Law, Listed, Signature, Value, check, per_joint};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -40,7 +41,37 @@ impl Law for ViscousFriction {
     }
 }
 
+impl Signature for ViscousFriction {
+    const CARD: Card = Card {
+        words: "viscous friction",
+        meaning: "friction that grows with speed",
+        part: Part::Calibration,
+        size: Size::Along(&[Gauge::along("viscous", &[1.0])]),
+        axis: Axis::Speed,
+        exact_to: FRICTION_EXACT_TO,
+        weighs: true,
+        common: true,
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j))
+    }
+}
+
+impl Listed for ViscousFriction {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<ViscousFriction> {
+        let &[value] = coefficients else { return None };
+        Some(ViscousFriction { viscous: candidate.each(model, value) })
+    }
+
+    fn absorb(&mut self, other: ViscousFriction) -> Option<ViscousFriction> {
+        self.viscous.extend(other.viscous);
+        None
+    }
+}
+
 /// One column: the joint's speed. Coefficient: b.
-pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
+fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     vec![Column::on(joint, motion.v[joint].clone(), -motion.model.joints()[joint].damping)]
 }

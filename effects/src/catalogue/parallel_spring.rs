@@ -3,9 +3,10 @@
 //! M q̈ + C q̇ + g = τ − k (q − q₀): a spring, a cable loom or a counterbalance.
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 7.2 (external joint torques).
 
-use crate::effect::{Law, Value, check, per_joint};
-use crate::signature::Column;
-use crate::{EffectError, Kind, Motion, Plant};
+use crate::card::{Axis, Card, Force, Gauge, Size};
+use crate::law::{Law, Listed, Signature, Value, check, per_joint};
+use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
+use gapscope_dynamics::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -52,8 +53,40 @@ impl Law for ParallelSpring {
     }
 }
 
+impl Signature for ParallelSpring {
+    const CARD: Card = Card {
+        words: "spring across the joint",
+        meaning: "a spring, cable or counterbalance across the joint",
+        force: Some(Force::Constant),
+        size: Size::Along(&[Gauge { beside_others: true, ..Gauge::along("stiffness", &[1.0, 0.0]) }]),
+        axis: Axis::Position,
+        weighs: true,
+        ..Card::BLANK
+    };
+
+    fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j))
+    }
+}
+
+impl Listed for ParallelSpring {
+    fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<ParallelSpring> {
+        let &[stiffness, torque] = coefficients else { return None };
+        (stiffness > 0.0).then(|| ParallelSpring {
+            stiffness: candidate.each(model, stiffness),
+            rest_position: candidate.each(model, torque / stiffness),
+        })
+    }
+
+    fn absorb(&mut self, other: ParallelSpring) -> Option<ParallelSpring> {
+        self.stiffness.extend(other.stiffness);
+        self.rest_position.extend(other.rest_position);
+        None
+    }
+}
+
 /// Two columns: position and minus one. Coefficients: k and k q₀.
-pub(crate) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
+fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     vec![
         Column::on(joint, motion.q[joint].clone(), 0.0),
         Column::on(joint, vec![-1.0; motion.len()], f64::NEG_INFINITY),

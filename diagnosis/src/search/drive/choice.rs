@@ -1,0 +1,107 @@
+//! Whether a drive that turns on its own takes the place of a rigid one in what was chosen.
+
+use crate::fit::estimate::Fit;
+use crate::fit::problem::Problem;
+use crate::fit::terms::Term;
+use crate::record::floor::noise_floor;
+use crate::record::logs::{Progress, Record};
+use crate::search::chosen::{Chosen, Turned, with_drive};
+use crate::search::converge::weighing;
+use gapscope_effects::{Candidate, EffectError, Kind};
+
+/// What is left of a joint is more than noise from this multiple of its floor on: its drive is worth a look.
+pub(super) const MORE_THAN_NOISE: f64 = 1.3;
+/// Accounts of drives that are tried in each pass.
+const ACCOUNTS: usize = 2;
+
+impl Record<'_> {
+    /// Puts a spring or play in the drive of one joint where the logs speak for it: beside all else that was found, beside the
+    /// calibration alone, and where noise may have drowned what a spring does, through a filter.
+    pub(crate) fn drive(&self, rigid: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let mut joints = self.restless(&rigid)?;
+        // What was found beyond calibration may stand in for a drive.
+        if rigid.exact.entries.iter().any(|e| !e.candidate.kind.is_calibration() && !e.candidate.kind.is_outside()) {
+            joints.extend((0..self.model.dof()).filter(|j| self.moving[*j] && !joints.contains(j)).collect::<Vec<_>>());
+        }
+        if joints.is_empty() {
+            return Ok(rigid);
+        }
+        let entries = |keep: &dyn Fn(Kind) -> bool| -> Vec<usize> {
+            (0..rigid.exact.entries.len()).filter(|&i| keep(rigid.exact.entries[i].candidate.kind)).collect()
+        };
+        let beside = entries(&|kind| !kind.card().rotor);
+        let bodies = entries(&|kind| !kind.card().rotor && kind.is_calibration());
+        let mut best: Option<Chosen> = None;
+        let mut tried: Vec<(Candidate, f64)> = Vec::new();
+        for (set, through) in [(&beside, false), (&bodies, false), (&beside, true)] {
+            if best.is_some() {
+                break;
+            }
+            let others = if set.len() == beside.len() {
+                (rigid.exact.clone(), Fit { set: beside.clone(), ..rigid.fit.clone() })
+            } else {
+                let rest: Vec<Candidate> = set.iter().map(|&i| rigid.exact.entries[i].candidate.clone()).collect();
+                self.data(&rigid.noise).refine(&rest)?
+            };
+            for account in self.accounts(&joints, &others.0, &others.1, through)?.into_iter().take(ACCOUNTS) {
+                let (all, place) = self.with_rotor(&rigid, account.drive.joints[0]);
+                let mut choice = rigid.choice.clone();
+                if set.len() < beside.len() {
+                    choice.set.retain(|&c| all.entries[c].candidate.kind.is_calibration());
+                }
+                choice.set.push(place);
+                choice.set.sort_unstable();
+                choice.set.dedup();
+                let turned = Turned { place, drive: account.drive.clone(), odds: 0.0 };
+                // Beside what was found as it is, and with the choice made again around it.
+                let plain = self.data(&rigid.noise).refine(&with_drive(&all, &choice.set, &Some(turned.clone())))?;
+                let next = self.converge(all, choice.clone(), rigid.noise.clone(), Some(turned.clone()), progress)?;
+                let plain = Chosen { turned: Some(turned), ..next.with(choice, plain.0, plain.1) };
+                let next = if plain.odds_against(&next, self)? > 0.0 { plain } else { next };
+                if !next.has_rotor() {
+                    continue;
+                }
+                let odds = next.odds_against(best.as_ref().unwrap_or(&rigid), self)?;
+                tried.push((account.drive, odds));
+                if odds > 0.0 {
+                    best = Some(next);
+                }
+            }
+        }
+        let Some(best) = best else { return Ok(Chosen { tried, ..rigid }) };
+        // What else came with it may be as good beside a rigid drive.
+        let stiff = self.converge(best.all.clone(), best.choice.clone(), rigid.noise.clone(), None, progress)?;
+        let rigid = if stiff.odds_against(&rigid, self)? > 0.0 { stiff } else { rigid };
+        let odds = best.odds_against(&rigid, self)?;
+        if odds <= 0.0 || !best.concerns_beside(&rigid) {
+            return Ok(Chosen { tried, ..rigid });
+        }
+        let turned = best.turned.map(|turned| Turned { odds, ..turned });
+        Ok(Chosen { turned, tried, ..best })
+    }
+
+    /// Joints of which more than noise is left, those with most of it first.
+    fn restless(&self, chosen: &Chosen) -> Result<Vec<usize>, EffectError> {
+        let rest = self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?;
+        let floor = noise_floor(&self.signals, &self.band, &rest, self.model.dof());
+        let level = |j: usize| chosen.exact.sigma[j] / floor[j].max(f64::MIN_POSITIVE);
+        let mut joints: Vec<usize> =
+            (0..self.model.dof()).filter(|&j| self.moving[j] && level(j) > MORE_THAN_NOISE).collect();
+        joints.sort_by(|&a, &b| level(b).total_cmp(&level(a)));
+        Ok(joints)
+    }
+
+    /// All candidates of a choice, and among them the place of a joint's rotor, in case the choice was made without rotors.
+    fn with_rotor(&self, chosen: &Chosen, joint: usize) -> (Problem, usize) {
+        let rotor = Candidate::rotor(joint);
+        let entries = &chosen.all.entries;
+        if let Some(place) = entries.iter().position(|e| e.candidate == rotor) {
+            return (chosen.all.clone(), place);
+        }
+        let open = |candidate: Candidate| Term { candidate, tangent_at: None };
+        let candidates = entries.iter().map(|e| e.candidate.clone()).chain([rotor]);
+        let mut all = self.data(&chosen.noise).problem(candidates.map(open).collect(), &weighing());
+        all.closed.clone_from(&chosen.all.closed);
+        (all, entries.len())
+    }
+}

@@ -10,9 +10,9 @@ use crate::answer::learner;
 use crate::answer::power;
 use crate::answer::regimes::regimes;
 use crate::answer::structure;
-use crate::answer::verdict;
 use crate::answer::verdict::Judged;
 use crate::carry::corrected::{Corrected, MODEL_SCHEMA};
+use crate::numbers::decide::LEAST_ROWS;
 use crate::record::floor::noise_floor;
 use crate::record::known::Known;
 use crate::record::logs::{Progress, Record};
@@ -82,7 +82,7 @@ pub fn diagnose(
 
 impl Record<'_> {
     fn is_excited(&self) -> bool {
-        self.moving.iter().any(|m| *m) && self.band.rows.len() >= verdict::LEAST_ROWS
+        self.moving.iter().any(|m| *m) && self.band.rows.len() >= LEAST_ROWS
     }
 
     fn conclude(

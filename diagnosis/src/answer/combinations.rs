@@ -7,13 +7,12 @@
 use crate::answer::covariance::HALF;
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
+use crate::numbers::decide::DETERMINED;
 use crate::schema::Combination;
 use gapscope_dynamics::{Inertia, JointKind, Model, Placement};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
-/// Record determine a sum whose interval is narrower than this part of the one that it had before them.
-const DETERMINED: f64 = 0.5;
 /// A direction counts as across an axis where its cosine with it is below this.
 const ACROSS: f64 = 0.5;
 /// Public names of the ten inertial parameters.

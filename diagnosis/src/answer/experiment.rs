@@ -8,6 +8,7 @@ use crate::fit::estimate::Fit;
 use crate::fit::plant::plant;
 use crate::fit::problem::Problem;
 use crate::fit::terms::Term;
+use crate::numbers::decide::SEPARATED;
 use crate::record::band::Band;
 use crate::record::data::Data;
 use crate::record::known::Known;
@@ -37,8 +38,6 @@ const LIBRARY: [(ReferenceKind, f64); 8] = [
 ];
 /// Motions drawn of each.
 const SEEDS: u64 = 2;
-/// Accounts that lie fewer standard errors apart than this may still be confused.
-const ENOUGH: f64 = 6.0;
 /// Part of a column's size below which nothing of it is left.
 const RIDGE: f64 = 1e-9;
 
@@ -125,7 +124,7 @@ pub fn next_experiment(
     // The first of equals: the order of the library does not depend on the number of threads.
     let best = tried.into_iter().reduce(|best, other| if other.0 > best.0 { other } else { best });
     let proposal = match best {
-        Some((separation, design, trajectory)) if separation >= ENOUGH => {
+        Some((separation, design, trajectory)) if separation >= SEPARATED => {
             let motion = format!(
                 "follow {FILE} (look for collisions first): {}. {} and {other} would then lie {separation:.0} standard \
                  errors apart",

@@ -4,6 +4,7 @@ use crate::answer::covariance::covariance;
 use crate::answer::verdict::Judged;
 use crate::fit::estimate::{Fit, speeds};
 use crate::fit::problem::Problem;
+use crate::numbers::decide::{MISFIT, THERE, TWENTY_TO_ONE, WORTH_NAMING};
 use crate::record::logs::Record;
 use crate::record::rows::Rows;
 use crate::schema::*;
@@ -12,18 +13,6 @@ use crate::search::climb;
 use crate::search::rivals;
 use crate::search::rivals::Rival;
 use gapscope_effects::{EffectError, Kind};
-
-/// A rival as likely as this is named beside the choice.
-const WORTH_NAMING: f64 = 0.01;
-/// An effect whose best rival is less likely by no more than this cannot be told from it, nats: twenty to one.
-const TIE: f64 = 3.0;
-/// Power of the explained part of the gap by which confidence falls: what leaves much of the gap may be the nearest thing
-/// that the catalogue has to a cause that it has not.
-const MISFIT: i32 = 4;
-
-/// Effects that are there, of those named beside a rest so large that nothing speaks for them, and of those named beyond
-/// doubt, measured on withheld cases: laws that nobody has thought of look like those in the catalogue at times.
-const THERE: (f64, f64) = (0.45, 0.98);
 
 /// The part of effects with such an evidence that are there.
 fn calibrated(evidence: f64) -> f64 {
@@ -64,13 +53,13 @@ impl Record<'_> {
             };
             let others: Vec<&Rival> = rival.into_iter().chain(&swap).filter(|_| turned.is_none()).collect();
             // What could be another is no surer than that it is not.
-            let tied = others.iter().map(|r| r.odds).filter(|odds| *odds < TIE);
+            let tied = others.iter().map(|r| r.odds).filter(|odds| *odds < TWENTY_TO_ONE);
             let odds = tied.fold(odds, |odds, tied| odds.min(tied.max(0.0)));
             let doubt = late.unwrap_or(0.0).max(1.0 / (1.0 + odds.exp()));
-            let near = others.iter().filter(|r| late.is_none() && r.odds.min(r.by_logs) < TIE);
+            let near = others.iter().filter(|r| late.is_none() && r.odds.min(r.by_logs) < TWENTY_TO_ONE);
             let mut confused: Vec<String> =
                 near.flat_map(|r| r.instead(&chosen.all, &chosen.choice)).map(|kind| kind.name().to_owned()).collect();
-            if late.is_some_and(|doubt| doubt > (-TIE).exp()) {
+            if late.is_some_and(|doubt| doubt > (-TWENTY_TO_ONE).exp()) {
                 confused.extend(climb::late().filter(|other| *other != kind).map(|k| k.name().to_owned()));
             }
             confused.sort();

@@ -1,6 +1,7 @@
 //! Where the gap lies, and how far it shrinks: figures of residuals at the rows of the band, on held-out data.
 
 use crate::numbers::bootstrap::interval;
+use crate::numbers::decide::AT_FLOOR;
 use crate::record::band::Band;
 use crate::record::rows::{Rows, squares, total, weighted_rms};
 use crate::schema::{Change, PerJoint, TorqueGap};
@@ -48,6 +49,3 @@ pub fn change(before: &[Vec<f64>], after: &[Vec<f64>], weights: &[f64], floor: f
         ci95: if claimed { interval(&pairs, shrink) } else { None },
     }
 }
-
-/// A gap below this multiple of the floor is at the floor: below one, because the floor is an estimate itself.
-const AT_FLOOR: f64 = 0.8;

@@ -6,6 +6,7 @@
 //! torque as anything must that is to be named.
 
 use crate::fit::problem::Problem;
+use crate::numbers::decide::TWENTY_TO_ONE;
 use crate::schema::Power;
 use crate::search::climb::{Competition, excludes};
 use crate::search::drive::Least;
@@ -15,9 +16,6 @@ use nalgebra::{DMatrix, DVector};
 
 /// Part of a column's size below which what the set leaves of it is rounding.
 const ROUNDING: f64 = 1e-7;
-
-/// Nats by which an effect must be likelier than none for it to be called seen.
-const LEAST_ODDS: f64 = 3.0;
 
 /// The least size of every effect at every joint; kinds in the order of the catalogue. The knob of an effect that has one,
 /// where it is not the size itself, is that in the middle of its grid. Those of springs and play in the `drives` are known.
@@ -133,7 +131,7 @@ fn least(problem: &Problem, set: &[usize], c: usize, direction: &[f64], beside_o
     let competition = Competition::new(problem);
     let price = competition.prior(&others) - competition.prior(&with) + problem.occam(&own, &information);
     // Half of the deviance is a nat.
-    Some((2.0 * price.max(LEAST_ODDS) / gain).sqrt())
+    Some((2.0 * price.max(TWENTY_TO_ONE) / gain).sqrt())
 }
 
 /// The part of some columns' inner products that others explain.

@@ -4,13 +4,8 @@
 //! current, or of an effort that comes in coarse counts. Such noise knows nothing of the motion: no network predicts it, it is
 //! of one size at all times, and a moment later it is forgotten. A law that the catalogue lacks is none of these.
 
-/// A network predicts less of noise than this part of its square, held out: what it predicts of noise by chance, several times.
-const PREDICTED: f64 = 0.05;
-/// Spread of the mean squares of seconds over what noise of the same correlation has. Of a minute it is 1 ± 0.2; a spot that
-/// rubs, chatter and the edges of friction have 4 to 10.
-const UNEVEN: f64 = 2.0;
-/// Rows that noise is correlated over, at most, as squares: 0.4 s at the usual cut-off. Drift is remembered longer.
-const REMEMBERED: f64 = 10.0;
+use crate::numbers::decide::{PREDICTED, REMEMBERED, UNEVEN};
+
 /// Rows of a second at the usual cut-off, and the least seconds that tell.
 const SECOND: usize = 25;
 const SECONDS: usize = 12;

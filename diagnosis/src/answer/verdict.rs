@@ -1,23 +1,8 @@
 //! The answer in a word.
 
+use crate::numbers::decide::{ALONE, ALONE_GAP, EXPLAINED, IMMATERIAL_GAP, MATERIAL_GAP, NEAR_FLOOR};
 use crate::record::rows;
 use crate::schema::Verdict;
-
-/// Fewer rows than this tell nothing.
-pub const LEAST_ROWS: usize = 50;
-/// A gap under this multiple of the noise floor is noise, as far as the estimate of the floor can tell.
-const NEAR_FLOOR: f64 = 1.5;
-/// A gap under this part of the effort's variation is nobody's concern.
-const IMMATERIAL_GAP: f64 = 0.01;
-/// A gap over this part of the effort's variation matters, however much larger it was before.
-const MATERIAL_GAP: f64 = 0.1;
-/// Effects explain the gap if they leave less than this part of its square above the floor: about a twentieth of the gap.
-const EXPLAINED: f64 = 0.003;
-/// One joint alone leaves more than noise at this multiple of its floor: any of them may, by chance or by what smoothing makes
-/// of a law.
-const ALONE: f64 = 3.0;
-/// ... and this part of its effort: the torque of one drive is hardly known to better than half of that.
-const ALONE_GAP: f64 = 0.02;
 
 /// Weighted held-out gap before and after, and the noise floor in the same measure.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -148,7 +148,7 @@ pub enum RolloutError {
 /// `contenders`. Horizons are the same for all: whole numbers of the longest step among logs and models.
 ///
 /// # Errors
-/// Record that are too short, a robot without inertia, or a model whose step is no whole number of samples.
+/// Logs that are too short, a robot without inertia, or a model whose step is no whole number of samples.
 pub fn rollouts(
     model: &Model,
     episodes: &[Episode],

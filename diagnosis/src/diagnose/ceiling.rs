@@ -1,7 +1,7 @@
 //! What no robot has: an effect beyond the robot's own bodies, limits and joints is not reported as found, whatever fits.
 
 use crate::diagnose::Outcome;
-use crate::diagnose::doubt::COULD_BE;
+use crate::numbers::decide::COULD_BE;
 use crate::schema::{Change, FoundEffect, Parameter, Quantity, Verdict};
 use gapscope_dynamics::{Joint, JointKind, Model};
 use gapscope_effects::Effect;

@@ -1,11 +1,9 @@
 //! A diagnosis of logs that may be wrong: no confident answer where a fault of the data would be the other one.
 
 use crate::diagnose::Outcome;
+use crate::numbers::decide::COULD_BE;
 use crate::schema::{Change, Gap, Shrink, Verdict};
 use gapscope_datasets::{Doubt, Fault};
-
-/// Confidence of an effect that a fault of the data would explain as well: it could be.
-pub(crate) const COULD_BE: f64 = 0.45;
 
 impl Outcome {
     /// Enters what is wrong with the logs, and what may be: effects that would be the other explanation of a doubt are

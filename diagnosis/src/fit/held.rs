@@ -1,9 +1,8 @@
 //! What friction held at rest: no fit of motion tells it where a joint leaves rest too fast to be seen, but rests do.
 
+use crate::numbers::decide::RESTS;
 use crate::numbers::quantile::quantile;
 
-/// Part of a fold that a joint must rest for its rests to tell: the blows of other joints would outweigh few of them.
-const RESTS: f64 = 0.1;
 /// Part of the rests of a fold that end well below the break-away torque: by so many times what the others differ, it may
 /// lie higher, as a rest that ends in a moment is averaged with what comes before.
 const WELL_BELOW: f64 = 0.98;

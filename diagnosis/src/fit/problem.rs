@@ -12,7 +12,6 @@ use crate::record::band::Band;
 use crate::record::frequency::{Equalizer, in_bands};
 use crate::record::known::Known;
 use crate::record::signals::Signals;
-pub use evidence::AT_REST;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Body, Candidate, Column, EncoderSide, Kind};
 use rayon::prelude::*;

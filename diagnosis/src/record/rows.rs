@@ -1,11 +1,9 @@
 //! Residual torque at the rows of a band, and its sums of squares by block of time.
 
+use crate::numbers::decide::UNNOTICED;
 use crate::record::band::Band;
 use crate::record::signals::Signals;
 use gapscope_dynamics::Model;
-
-/// Part of a joint's effort limit that is nobody's concern.
-const UNNOTICED: f64 = 1e-3;
 
 /// Residual torque at the rows of the band: `[joint][row]`, N m or N.
 pub type Rows = Vec<Vec<f64>>;

@@ -3,13 +3,10 @@
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
 use crate::fit::terms::Entry;
+use crate::numbers::decide::PRICE_OF_TURNING;
 use crate::search::climb;
 use crate::search::climb::{Choice, Competition};
 use gapscope_effects::{Candidate, Kind};
-
-/// Nats that a spring or play must bring beside its rotor: as rare as any kind, on either side of the gear, a knob that the
-/// logs know to a twentieth of its range, and what the best of some hundred tries finds in noise.
-const TURNS: f64 = 3.0 + 0.7 + 3.0 + 9.0;
 
 /// What an account leaves: `[episode][joint][signal]`, N m or N.
 pub(crate) type Rest = Vec<Vec<Vec<f64>>>;
@@ -56,7 +53,7 @@ impl Chosen {
 
     /// Log probability of the account before any log is seen.
     pub(crate) fn prior(&self) -> f64 {
-        let drive = if self.turns() { TURNS + (self.noise.len() as f64).ln() } else { 0.0 };
+        let drive = if self.turns() { PRICE_OF_TURNING + (self.noise.len() as f64).ln() } else { 0.0 };
         Competition::new(&self.all).prior(&self.choice.set) - drive
     }
 

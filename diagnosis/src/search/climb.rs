@@ -5,25 +5,18 @@
 //! A climb adds, drops and exchanges candidates while the score rises, from nothing and from the whole calibration.
 
 use crate::fit::problem::{Problem, Score, Solved};
+use crate::numbers::decide::{MATERIAL, PRICE_OF_OUTSIDE, PRICE_OF_SOME_LINKS, TWENTY_TO_ONE};
 use crate::record::band::Band;
 use gapscope_effects::Kind;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Nats that a kind beyond calibration must bring: about one arm in twenty has it.
-const FURTHER: f64 = 3.0;
-/// Nats that a law outside the catalogue must bring.
-const OUTSIDE: f64 = 5.0;
-/// Nats against some links being off while others are right: one may have been wrong in the URDF, or all are a little.
-const SOME_LINKS: f64 = 20.0;
 /// Moves of a climb, at most.
 const MOVES: usize = 150;
 /// Candidates of a first look that are looked at exactly.
 pub(super) const SHORTLIST: usize = 6;
 /// Times that the problem is weighed anew, at most.
 const WEIGHINGS: usize = 3;
-/// Part of a joint's effort by which a kind must move it, beside all that the others could do instead.
-const MATERIAL: f64 = 0.003;
 /// Rise of the score that is worth a move, nats.
 const RISE: f64 = 0.01;
 
@@ -124,11 +117,11 @@ impl<'a> Competition<'a> {
                 let of_kind: Vec<usize> = set.iter().copied().filter(|&c| self.kind(c) == kind).collect();
                 let (places, used) = (self.places[of_kind[0]].0, of_kind.len());
                 let rare = match kind {
-                    kind if kind.is_outside() => OUTSIDE,
+                    kind if kind.is_outside() => PRICE_OF_OUTSIDE,
                     kind if kind.is_calibration() => 0.0,
-                    _ => FURTHER,
+                    _ => TWENTY_TO_ONE,
                 };
-                let few = if kind.card().described && used > 1 && used < places { SOME_LINKS } else { 0.0 };
+                let few = if kind.card().described && used > 1 && used < places { PRICE_OF_SOME_LINKS } else { 0.0 };
                 let shapes: f64 = of_kind.iter().map(|&c| (self.places[c].1 as f64).ln()).sum();
                 -(rare + few + shapes + (places as f64).ln() + ln_choose(places, used))
             })

@@ -1,22 +1,16 @@
 //! When something outside pushed: stretches of time in which the torque leaves what any law of the robot gives.
 
+use crate::numbers::decide::{NO_INCIDENT, STANDS_OUT, UNCLEAR};
 use crate::record::band::Band;
 use crate::record::rows::Rows;
 use crate::record::signals::Signals;
 
-/// A row stands out if the rest, over the spread of the calm half of all rows, has this root mean square over the joints.
-const STANDS_OUT: f64 = 5.0;
 /// First quartile of the size of a standard normal number.
 const QUARTER: f64 = 0.3186;
 /// Stretches closer than this are one, and shorter ones none, s.
 const SHORTEST: f64 = 0.12;
-/// What stands out for longer than this part of the logs is no incident.
-const AT_MOST: f64 = 0.6;
 /// A push begins and ends where the rest crosses this part of its height in the stretch: the filter has spread it evenly.
 const EDGE: f64 = 0.5;
-
-/// Standard error of the part of a force that is there from which on a row says nothing of it.
-const UNCLEAR: f64 = 0.25;
 
 /// What is left of the torque at the rows of the band, and its noise: `[joint][row]`, N m or N.
 pub struct Left {
@@ -71,7 +65,7 @@ pub fn stretches(signals: &[Signals], band: &Band, left: &Left) -> Vec<Vec<[f64;
         })
         .collect();
     let outside = height.iter().filter(|h| **h > STANDS_OUT).count();
-    if outside as f64 > AT_MOST * height.len() as f64 {
+    if outside as f64 > NO_INCIDENT * height.len() as f64 {
         return vec![Vec::new(); signals.len()];
     }
     above(signals, band, &height, STANDS_OUT, |inside| {

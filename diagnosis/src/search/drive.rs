@@ -11,6 +11,7 @@ mod choice;
 mod least;
 mod left;
 
+use crate::numbers::decide::{LIGHTEST_ROTOR, MAY_BE_RIGID, UNNOTICED};
 pub(crate) use least::Least;
 use left::{beyond_doubt, dot, mean, mean_square, noisier, tells};
 
@@ -43,22 +44,6 @@ const MOVES: usize = 40;
 /// Gauss–Newton steps from each first try, and the farthest that one goes, relative.
 const DESCENTS: usize = 3;
 const FARTHEST: f64 = 0.5;
-/// A drive is not rigid where over the blocks of time that tell, the logarithm of what an account of it leaves is less by so
-/// many standard errors (a burst of chatter is one block, and counts no more than its logarithm), ...
-const BEYOND_DOUBT: f64 = 1.0;
-/// ... and this part of the mean square, or less.
-const PART: f64 = 0.85;
-/// Part of the noise, and of the effort, below which what is left of a block of time is as good as nothing: play may show in
-/// few of them.
-const OF_NOISE: f64 = 0.25;
-const NOTHING: f64 = 1e-3;
-/// A rotor lighter than this part of what it turns would not show.
-const LIGHTEST: f64 = 0.05;
-/// So many blocks of time must show something at all: a joint that its load holds on one side may cross its play once or twice.
-const LEAST_TELLING: usize = 2;
-/// Standard errors from a rigid drive up to which the drive may be rigid: what the best of the hundred tries at each joint
-/// finds in noise, and what [`crate::search::choose`] asks of a drive before any log is seen, k²/2 = 13 nats.
-const RIGID: f64 = 5.0;
 const SEED: u64 = 5;
 
 /// An account of one joint's drive that leaves less than a rigid one.
@@ -196,7 +181,7 @@ impl<'a> Study<'a> {
             })
             .collect();
         let effort = mean(&logs.signals.iter().map(|s| mean_square(&s.tau[joint])).collect::<Vec<_>>());
-        study.unnoticed = NOTHING * NOTHING * effort;
+        study.unnoticed = UNNOTICED * UNNOTICED * effort;
         study.rigid = study.rigid_in(View::default());
         study.rotor = study.turn(rigid, study.rotor).1;
         study.rigid = study.rigid_in(View::default());
@@ -244,7 +229,7 @@ impl<'a> Study<'a> {
                 let measure = self.measure(&drive, rotor);
                 // A drive that may be rigid is another account's, and so is a gap that no gear has.
                 let drive = Candidate { knob_error: self.error(&drive, rotor), ..drive };
-                if drive.errors_from_rigid() < RIGID || drive.shape > turning.widest {
+                if drive.errors_from_rigid() < MAY_BE_RIGID || drive.shape > turning.widest {
                     continue;
                 }
                 if best.as_ref().is_none_or(|(least, ..)| measure < *least) {
@@ -264,7 +249,7 @@ impl<'a> Study<'a> {
     /// Whether a rotor is heavy enough for its drive to show. A link without inertia about its joint has no drive that turns
     /// on its own: some URDFs have such last links.
     fn shows(&self, rotor: f64) -> bool {
-        self.inertia > 0.0 && rotor > 1.1 * LIGHTEST * self.inertia
+        self.inertia > 0.0 && rotor > 1.1 * LIGHTEST_ROTOR * self.inertia
     }
 
     /// The rotor with which a rigid drive leaves least, by least squares.
@@ -277,7 +262,7 @@ impl<'a> Study<'a> {
             }
         }
         let rotor = if square > 0.0 { product / square } else { 0.0 };
-        rotor.max(LIGHTEST * self.inertia)
+        rotor.max(LIGHTEST_ROTOR * self.inertia)
     }
 
     /// Knob and rotor of a drive after some Gauss–Newton steps in compliance or gap, in which what is left is nearly linear;
@@ -308,7 +293,7 @@ impl<'a> Study<'a> {
             let Some(step) = gram.lu().solve(&moment).filter(|step| step.iter().all(|x| x.is_finite())) else { break };
             let bounded = |step: f64| 1.0 + step.clamp(-FARTHEST, FARTHEST);
             drive.shape *= bounded(step[0]).powf(power);
-            rotor = (rotor * bounded(step[1])).max(LIGHTEST * self.inertia);
+            rotor = (rotor * bounded(step[1])).max(LIGHTEST_ROTOR * self.inertia);
         }
         (drive, rotor)
     }

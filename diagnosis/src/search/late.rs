@@ -4,15 +4,13 @@
 //! by the model (instrumental variables; Söderström and Stoica, Instrumental Variable Methods for System Identification,
 //! 1983).
 
+use crate::numbers::decide::LATE_KNOWN_TO;
 use crate::record::logs::Record;
 use crate::record::rows;
 use crate::record::rows::Rows;
 use crate::search::chosen::{Chosen, with_drive};
 use crate::search::climb::Choice;
 use gapscope_effects::{Candidate, EffectError, lagged};
-
-/// Standard error below which the part that speaks for the other law is not believed: no drive is one or the other exactly.
-const INEXACT: f64 = 0.15;
 
 /// Time of the lag by which that effort is smoothed both ways, s, and its least over the law's own: the motion has noise too,
 /// which is in what is left as well, and in the effort where a servo answers to it. Both grow with the frequency far faster
@@ -77,7 +75,7 @@ impl Record<'_> {
         let error = sums.iter().map(|(l, b)| (l - part * b).powi(2)).sum::<f64>().sqrt() / between.abs();
         // What lies beyond both laws is something else, and so may be what lies between them.
         let beyond = part - part.clamp(0.0, 1.0);
-        let odds = (2.0 * part - 1.0) / (2.0 * error.hypot(INEXACT).hypot(beyond).powi(2));
+        let odds = (2.0 * part - 1.0) / (2.0 * error.hypot(LATE_KNOWN_TO).hypot(beyond).powi(2));
         1.0 / (1.0 + (-odds).exp())
     }
 }

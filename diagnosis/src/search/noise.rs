@@ -5,6 +5,7 @@
 //! logged (the Jacobian of a change of variables). So each account runs a second time with some noise more; where one makes
 //! more of it than the other, what it leaves is scaled down to what the other makes of it, frequency by frequency.
 
+use crate::numbers::decide::FILTER_KNOWN_TO;
 use crate::record::data::Data;
 use crate::record::frequency::{BANDS, Equalizer, in_frequency};
 use crate::record::logs::PART_OF_NOISE;
@@ -14,9 +15,6 @@ use crate::record::rows::Rows;
 use crate::record::signals::Signals;
 use crate::search::chosen::{Chosen, Rest};
 use gapscope_effects::EffectError;
-
-/// What a law makes of noise is known to this part: how much of it is the position's and how much the effort's, how white.
-const KNOWN_TO: f64 = 0.15;
 
 impl Record<'_> {
     /// What brings the residuals of two accounts, each with what it leaves of every run, to one noise. Noise of the position is
@@ -56,7 +54,7 @@ impl Record<'_> {
                 std::array::from_fn(|b| {
                     let less = through[1 - i][j][b] - through[i][j][b];
                     // In doubt for the account without the law.
-                    let doubt = if filters[1 - i] && !filters[i] { less.abs().min(KNOWN_TO) } else { 0.0 };
+                    let doubt = if filters[1 - i] && !filters[i] { less.abs().min(FILTER_KNOWN_TO) } else { 0.0 };
                     (less.min(0.0) - doubt).exp()
                 })
             };

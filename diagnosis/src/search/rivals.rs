@@ -1,13 +1,11 @@
 //! What could stand in the place of what was chosen.
 
 use crate::fit::problem::Problem;
+use crate::numbers::decide::MISSED;
 use crate::search::climb::{Account, Choice, Competition, SHORTLIST, kinds, told_together};
 use gapscope_effects::Kind;
 use rayon::prelude::*;
 use std::ops::Range;
-
-/// Nats that the logs lose where something is missed: what comes in its place must explain as much.
-const MISSED: f64 = 20.0;
 
 /// The best account of the logs without a kind that was chosen.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! Friction that rises towards rest, in the place of one that slides.
 
 use crate::fit::estimate::speeds;
-use crate::fit::problem::AT_REST;
+use crate::numbers::decide::OUTLIER;
 use crate::record::logs::Record;
 use crate::search::chosen::{Chosen, with_drive};
 use crate::search::climb::Choice;
@@ -15,7 +15,7 @@ impl Record<'_> {
         let rest = self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?;
         let bears = |c: usize| {
             let bears = |j: &usize| {
-                let beyond = AT_REST * chosen.exact.sigma[*j];
+                let beyond = OUTLIER * chosen.exact.sigma[*j];
                 self.at_rest(*j, &rest).into_iter().flatten().any(|x| x.abs() > beyond)
             };
             of(c).joints.iter().any(bears)

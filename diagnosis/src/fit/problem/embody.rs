@@ -2,12 +2,10 @@
 //! ([`gapscope_effects::Body`]), and Newton's method with a line search finds the least of the sum.
 
 use super::Problem;
+use crate::numbers::decide::BODIES_PULL;
 use gapscope_effects::Body;
 use nalgebra::{DMatrix, DVector};
 
-/// What the divergence of a link from the URDF counts, nats: so little that it moves what logs determine by nothing, enough
-/// that what they do not determine stays a body.
-const DIVERGENCE: f64 = 0.01;
 /// Steps, at most, halvings of a step, at most, and the rise of the sum, nats, from which on it has settled.
 const STEPS: usize = 40;
 const HALVINGS: usize = 30;
@@ -49,14 +47,14 @@ impl Problem {
         let sum = |theta: &DVector<f64>| -> f64 {
             let divergence = |link: &Link| link.body.divergence(&link.more(theta)).map_or(f64::INFINITY, |d| d.value);
             let fit = 0.5 * theta.dot(&(gram * theta)) - moment.dot(theta);
-            fit + DIVERGENCE * links.iter().map(divergence).sum::<f64>()
+            fit + BODIES_PULL * links.iter().map(divergence).sum::<f64>()
         };
         let mut least = sum(&here);
         for _ in 0..STEPS {
             let (mut curved, mut pull) = (gram.clone(), moment.clone());
             for link in &links {
                 let Some(divergence) = link.body.divergence(&link.more(&here)) else { continue };
-                let (gradient, hessian) = (divergence.gradient * DIVERGENCE, divergence.hessian * DIVERGENCE);
+                let (gradient, hessian) = (divergence.gradient * BODIES_PULL, divergence.hessian * BODIES_PULL);
                 let own: DVector<f64> = DVector::from_row_slice(&link.more(&here));
                 let target = hessian * own - gradient;
                 for &a in &link.at {

@@ -1,18 +1,14 @@
 //! What logs say for an account at its exact law, and by how much for one rather than another.
 
 use super::Problem;
-use super::weigh::INEXACT;
 use crate::fit::estimate::Fit;
+use crate::numbers::decide::{FREEDOM, LAW_EXACT_TO, OUTLIER};
 use crate::record::band::Band;
 use crate::record::frequency::Equalizer;
 use statrs::function::erf::erfc;
 
-/// Degrees of freedom of what is left, and steps towards its variance.
-const FREEDOM: f64 = 4.0;
+/// Steps towards the variance of what is left.
 const TAIL_STEPS: usize = 30;
-/// Standard deviations of what a sliding joint leaves up to which what is borne at rest beyond friction is noise.
-pub const AT_REST: f64 = 3.0;
-
 /// What logs say for an account, nats.
 pub struct Evidence {
     /// Log likelihood of each block of time, ...
@@ -33,7 +29,7 @@ impl Evidence {
     pub fn at_rest(&mut self, borne: &[Vec<Option<f64>>], variance: &[f64], correlation: &[f64], band: &Band) {
         for (j, borne) in borne.iter().enumerate() {
             for (row, borne) in band.rows.iter().zip(borne).filter(|(row, _)| row.fits) {
-                let beyond = borne.map_or(0.0, |x| (x.abs() - AT_REST * variance[j].sqrt()).max(0.0));
+                let beyond = borne.map_or(0.0, |x| (x.abs() - OUTLIER * variance[j].sqrt()).max(0.0));
                 let square = beyond * beyond / (FREEDOM * variance[j]);
                 let nats = 0.5 * (FREEDOM + 1.0) * square.ln_1p() / correlation[j];
                 self.seen[row.block] -= nats;
@@ -108,7 +104,7 @@ impl Problem {
         let noise = vec![1.0; self.joints.len()];
         let mut evidence = Evidence { seen: blocks.clone(), held_out: blocks, occam: 0.0, far: 0.0, noise };
         for (j, joint) in self.joints.iter().enumerate().filter(|(_, joint)| !joint.rows.is_empty()) {
-            let inexact: Vec<f64> = joint.linear_target.iter().map(|x| (INEXACT * x).powi(2)).collect();
+            let inexact: Vec<f64> = joint.linear_target.iter().map(|x| (LAW_EXACT_TO * x).powi(2)).collect();
             let least = self.least_noise(j);
             let nats = |rest: Vec<f64>| -> Vec<f64> {
                 let mut nats = vec![0.0; rest.len()];
@@ -205,7 +201,7 @@ mod tests {
             evidence.at_rest(&[vec![Some(borne); band.rows.len()]], &[1.0], &[1.0], &band);
             evidence.seen.iter().sum::<f64>()
         };
-        assert_eq!(at(0.9 * AT_REST), 0.0);
-        assert!(at(2.0 * AT_REST) < 0.0 && at(4.0 * AT_REST) < at(2.0 * AT_REST));
+        assert_eq!(at(0.9 * OUTLIER), 0.0);
+        assert!(at(2.0 * OUTLIER) < 0.0 && at(4.0 * OUTLIER) < at(2.0 * OUTLIER));
     }
 }

@@ -8,6 +8,7 @@
 //! ln p = −½ Σ ν_j ln v_j − ½ (Σ s_j / (ρ_j v_j) − bᵀA⁻¹b) − ½ ln|A| − ½ ln|P|,    ν_j = n_j / ρ_j.
 
 use super::Problem;
+use crate::numbers::decide::LEAST_GAP;
 use crate::numbers::factor::Factor;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -18,9 +19,6 @@ const ROUNDING: f64 = 1e-9;
 /// Steps of the fixed point for the noise of a set, and the relative change at which it has settled.
 const NOISE_STEPS: usize = 8;
 const NOISE_SETTLED: f64 = 0.01;
-/// Part of a joint's effort that the gap is taken for, at least, where coefficients are given their spread by it.
-const LEAST_GAP: f64 = 0.01;
-
 /// The normal equations at a level of noise, each coefficient in units of its spread.
 #[derive(Debug, Clone)]
 pub struct Score<'a> {

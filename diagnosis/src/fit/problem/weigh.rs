@@ -2,19 +2,12 @@
 
 use super::Problem;
 use super::solve::{JointNormal, Normal};
+use crate::numbers::decide::{FAR_OUT, LAW_EXACT_TO, OUTLIER, UNNOTICED};
 use crate::numbers::factor::Factor;
 use crate::record::band::Band;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Residuals beyond this many standard deviations get less weight (Huber 1964).
-const HUBER: f64 = 3.0;
-/// No law is exact to better than this part of the torque that it explains.
-pub(super) const INEXACT: f64 = 0.003;
-/// Beyond this multiple of that, the weight falls with the square.
-const FAR: f64 = 2.0;
-/// Errors under this part of a joint's effort are nobody's concern: they are what sampling and integration leave.
-const IMMATERIAL: f64 = 1e-3;
 /// Part of a column's size below which what others leave of it is rounding.
 const ROUNDING: f64 = 1e-9;
 impl Problem {
@@ -36,12 +29,12 @@ impl Problem {
                 let mut size: Vec<f64> = rest.iter().map(|r| r.abs()).collect();
                 let middle = size.len() / 2;
                 let spread = 1.4826 * *size.select_nth_unstable_by(middle, f64::total_cmp).1;
-                let least = IMMATERIAL * self.scale[j];
+                let least = UNNOTICED * self.scale[j];
                 for (weight, r) in rows.robust.iter_mut().zip(&rest) {
-                    let z = r.abs() / (HUBER * spread.max(least));
+                    let z = r.abs() / (OUTLIER * spread.max(least));
                     // Huber near, and far out as if the row were not there.
-                    *weight = if z > FAR {
-                        FAR / (z * z)
+                    *weight = if z > FAR_OUT {
+                        FAR_OUT / (z * z)
                     } else if z > 1.0 {
                         1.0 / z
                     } else {
@@ -97,7 +90,7 @@ impl Problem {
     fn allow_for_inexact_laws(&mut self) {
         for (rows, sigma) in self.joints.iter_mut().zip(&self.sigma) {
             for (weight, target) in rows.robust.iter_mut().zip(&rows.linear_target) {
-                *weight /= 1.0 + (INEXACT * target / sigma).powi(2);
+                *weight /= 1.0 + (LAW_EXACT_TO * target / sigma).powi(2);
             }
         }
     }
@@ -184,7 +177,7 @@ impl Problem {
 
     /// Least variance of the rows of a joint: what sampling and integration leave, (N m)² or N².
     pub(super) fn least_noise(&self, joint: usize) -> f64 {
-        (IMMATERIAL * self.scale[joint]).powi(2)
+        (UNNOTICED * self.scale[joint]).powi(2)
     }
 }
 

@@ -3,14 +3,13 @@
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
 use crate::fit::terms::Term;
+use crate::numbers::decide::WORTH_A_LOOK;
 use crate::record::floor::noise_floor;
 use crate::record::logs::{Progress, Record};
 use crate::search::chosen::{Chosen, Turned, with_drive};
 use crate::search::converge::weighing;
 use gapscope_effects::{Candidate, EffectError, Kind};
 
-/// What is left of a joint is more than noise from this multiple of its floor on: its drive is worth a look.
-pub(super) const MORE_THAN_NOISE: f64 = 1.3;
 /// Accounts of drives that are tried in each pass.
 const ACCOUNTS: usize = 2;
 
@@ -86,7 +85,7 @@ impl Record<'_> {
         let floor = noise_floor(&self.signals, &self.band, &rest, self.model.dof());
         let level = |j: usize| chosen.exact.sigma[j] / floor[j].max(f64::MIN_POSITIVE);
         let mut joints: Vec<usize> =
-            (0..self.model.dof()).filter(|&j| self.moving[j] && level(j) > MORE_THAN_NOISE).collect();
+            (0..self.model.dof()).filter(|&j| self.moving[j] && level(j) > WORTH_A_LOOK).collect();
         joints.sort_by(|&a, &b| level(b).total_cmp(&level(a)));
         Ok(joints)
     }

@@ -4,10 +4,10 @@
 //! was found: what that makes of the torque beyond noise and another rotor is what a rigid drive would have left, and is
 //! held against the bar of the search itself.
 
-use super::choice::MORE_THAN_NOISE;
 use super::{Rigid, Runs, Study, beyond_doubt, dot, mean, tells, turning};
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
+use crate::numbers::decide::WORTH_A_LOOK;
 use crate::record::logs::Record;
 use gapscope_effects::{Candidate, EffectError, EncoderSide, Kind, Turning};
 use rayon::prelude::*;
@@ -90,7 +90,7 @@ impl Study<'_> {
             return false;
         }
         let floor = floor * (mean(&without.noise) / mean(&self.rigid.noise).max(f64::MIN_POSITIVE)).sqrt();
-        mean(&hidden).sqrt().hypot(floor) > MORE_THAN_NOISE * floor
+        mean(&hidden).sqrt().hypot(floor) > WORTH_A_LOOK * floor
     }
 
     /// Mean square of each block that a rigid drive with the best rotor would leave of a drive, beyond noise, (N m)².

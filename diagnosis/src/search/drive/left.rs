@@ -1,6 +1,7 @@
 //! What an account of a joint's drive leaves, and of that what noise leaves.
 
 use super::*;
+use crate::numbers::decide::{BLOCK_OF_NOISE, BLOCKS_THAT_TELL, LIGHTEST_ROTOR, NOT_RIGID, NOT_RIGID_LEAVES};
 
 impl Study<'_> {
     /// What a drive leaves at the rows of the band; nothing of the episodes that are not looked at.
@@ -55,7 +56,7 @@ impl Study<'_> {
         let account = Candidate::rotor(self.joint);
         let (rest, noise) = self.rows_and_noise(&account, self.rotor, view);
         let seen: Vec<f64> = noise.iter().copied().filter(|noise| *noise > 0.0).collect();
-        let nothing = OF_NOISE * mean(&seen) + self.unnoticed;
+        let nothing = BLOCK_OF_NOISE * mean(&seen) + self.unnoticed;
         let mut rigid = Rigid { noise, nothing, left: Vec::new() };
         rigid.left = self.beyond(rest, &taken_off(&rigid.noise, &rigid, view), nothing);
         rigid
@@ -86,7 +87,7 @@ impl Study<'_> {
             let next = tries
                 .into_iter()
                 .map(|(knob, by)| (Candidate { shape: knob * best.1.shape, ..best.1.clone() }, by * best.2))
-                .filter(|(_, rotor)| *rotor >= LIGHTEST * self.inertia)
+                .filter(|(_, rotor)| *rotor >= LIGHTEST_ROTOR * self.inertia)
                 .map(|(drive, rotor)| (level(&drive, rotor), drive, rotor))
                 .find(|next| next.0 < best.0);
             match next {
@@ -179,7 +180,7 @@ impl Study<'_> {
 
 /// Whether enough blocks of time show something, by what is left of each.
 pub(super) fn tells(rigid: &Rigid, left: &[f64]) -> bool {
-    left.iter().filter(|left| **left > 2.0 * rigid.nothing).count() >= LEAST_TELLING
+    left.iter().filter(|left| **left > 2.0 * rigid.nothing).count() >= BLOCKS_THAT_TELL
 }
 
 /// By how many standard errors less is left of the blocks with an account than by a rigid drive, where that is beyond
@@ -190,7 +191,8 @@ pub(super) fn beyond_doubt(rigid: &Rigid, with: &[f64]) -> Option<f64> {
     let telling: Vec<f64> =
         ratios().filter(|(r, d)| r.max(**d) > 2.0 * rigid.nothing).map(|(r, d)| (r / d).ln()).collect();
     let beyond = telling.iter().sum::<f64>() / mean_square(&telling).sqrt() / (telling.len().max(1) as f64).sqrt();
-    (beyond > BEYOND_DOUBT && (gain > -PART.ln() || mean(with) < PART * mean(&rigid.left))).then_some(beyond)
+    (beyond > NOT_RIGID && (gain > -NOT_RIGID_LEAVES.ln() || mean(with) < NOT_RIGID_LEAVES * mean(&rigid.left)))
+        .then_some(beyond)
 }
 
 /// What is taken off for the noise of an account: what a rigid drive has of it at most, as play is so sensitive that noise

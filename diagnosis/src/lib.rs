@@ -1,53 +1,24 @@
 //! The gap between a robot's model and the robot: where it lies, which unmodelled effects cause it, and how far it shrinks
 //! once they are added, on held-out data.
 //!
-//! [`diagnose`] goes from logs to an [`Outcome`]; [`evaluate`] puts a [`Corrected`] model on other logs. Stages, each in a
-//! file: `signals` (smoothed, consistent), `band` (rows to compare), `problem` (least squares over all candidates),
-//! `select` (which), `estimate` (parameters), `gap`, `regimes`, `horizon` (where and how far), `floor`, `verdict`.
+//! [`diagnose`] goes from logs to an [`Outcome`]; [`evaluate`] puts a [`Corrected`] model on other logs. Storeys, each of which
+//! imports from those before it alone: `schema`, `numbers` (methods), `record` (what was measured), `fit` (from candidates to
+//! coefficients), `search` (which account), `answer` (what to say of it), `carry` (the answer on other logs), `diagnose`.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod band;
-mod bootstrap;
-mod break_away;
-mod ceiling;
-mod climb;
-mod combinations;
-mod contact;
-mod corrected;
-mod covariance;
+mod answer;
+mod carry;
 mod diagnose;
-mod doubt;
-mod drive;
-mod estimate;
-mod evaluate;
-mod evidence;
-mod experiment;
-mod floor;
-mod gap;
-mod horizon;
-mod kernel;
-mod late;
-mod learner;
-mod limits;
-mod noise;
-mod power;
-mod problem;
-mod pushes;
-mod refine;
-mod regimes;
-mod rollout;
+mod fit;
+mod numbers;
+mod record;
 pub mod schema;
-mod screen;
 mod search;
-mod signals;
-mod structure;
-#[cfg(test)]
-mod support;
-mod verdict;
 
-pub use corrected::{Corrected, CorrectedError, MODEL_SCHEMA, Origin};
-pub use diagnose::{Outcome, Progress, diagnose};
-pub use evaluate::{Predictions, evaluate, torque_changes};
-pub use experiment::FILE as NEXT_EXPERIMENT;
+pub use answer::experiment::FILE as NEXT_EXPERIMENT;
+pub use carry::corrected::{Corrected, CorrectedError, MODEL_SCHEMA, Origin};
+pub use carry::evaluate::{Predictions, evaluate, torque_changes};
+pub use carry::rollout::{BoundGrowth, Contender, ModelRollouts, RolloutError, RolloutOptions, rollouts};
+pub use diagnose::{Outcome, diagnose};
 pub use gapscope_effects::EncoderSide;
-pub use rollout::{BoundGrowth, Contender, ModelRollouts, RolloutError, RolloutOptions, rollouts};
+pub use record::logs::Progress;

@@ -2,6 +2,11 @@
 //!
 //! Maps are keyed by joint name and sorted, so that the same diagnosis gives the same bytes.
 
+mod evidence;
+mod figures;
+
+pub use evidence::*;
+pub use figures::*;
 use gapscope_datasets::{Doubt, Fault};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -155,77 +160,6 @@ pub enum Verdict {
     NotExcited,
 }
 
-/// Where the gap of the nominal model lies, on held-out data.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Gap {
-    /// Inverse-dynamics torque, N m (N for prismatic joints).
-    pub torque: TorqueGap,
-    /// One step x_{t+1} − f_phys(x_t, τ_t).
-    pub one_step: StateGap,
-    /// Open-loop rollouts under the logged effort, by horizon.
-    pub rollout: Vec<RolloutGap>,
-    /// Share of each regime in its joint's squared torque gap.
-    pub regimes: Vec<Regime>,
-}
-
-/// Torque gap per joint.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TorqueGap {
-    /// Root mean square of measured minus nominal torque.
-    pub rms: PerJoint,
-    /// What the noise of the log alone gives.
-    pub floor: PerJoint,
-    /// 95 % interval of `rms` by block bootstrap.
-    pub ci95: BTreeMap<String, [f64; 2]>,
-}
-
-/// One-step error per joint, rms.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StateGap {
-    /// rad (m).
-    pub position: PerJoint,
-    /// rad/s (m/s).
-    pub velocity: PerJoint,
-}
-
-/// Position error of rollouts at one horizon, rms over starts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RolloutGap {
-    /// Horizon, s.
-    pub horizon: f64,
-    /// rad (m).
-    pub position: PerJoint,
-}
-
-/// One regime of one joint: `standstill`, `reversal`, `low_speed`, `high_speed`, `high_load`, `high_acceleration`, `pose`, `frequency_band` or `time`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Regime {
-    /// Joint name.
-    pub joint: String,
-    /// Name of the regime.
-    pub regime: String,
-    /// What bounds the regime: quantity with unit and its interval, e.g. `speed`, `rad/s`, `[0, 0.05]`.
-    pub bounds: Bounds,
-    /// Part of the joint's squared torque gap that lies in this regime.
-    pub share: f64,
-    /// 95 % interval of `share`.
-    pub ci95: [f64; 2],
-    /// Part of the samples that lie in this regime (for a frequency band, part of the effort's variation): a share well above
-    /// it marks the regime.
-    pub samples: f64,
-}
-
-/// Interval of a quantity.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Bounds {
-    /// Quantity, e.g. `speed`.
-    pub quantity: String,
-    /// Unit.
-    pub unit: String,
-    /// From, to; `None` where open.
-    pub interval: [Option<f64>; 2],
-}
-
 /// What an effect is a part of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -368,67 +302,6 @@ pub struct Lookalike {
     pub joints: Vec<String>,
 }
 
-/// How far the gap shrinks on held-out data.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Shrink {
-    /// Weighted rms torque.
-    pub torque: Change,
-    /// Rms one-step velocity error over the joints that move, rad/s (m/s).
-    pub one_step: Change,
-    /// Rms rollout position error over the joints that move, by horizon, rad (m).
-    pub rollout: Vec<HorizonChange>,
-    /// Reference figures in the measure of `torque.after`.
-    pub reference: Reference,
-}
-
-/// A gap before and after.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Change {
-    /// Nominal model; `None` where it cannot be simulated (singular mass matrix).
-    pub before: Option<f64>,
-    /// Corrected model; `None` where it cannot be simulated.
-    pub after: Option<f64>,
-    /// 1 − after/before; `None` where `before` is at the floor.
-    pub shrink: Option<f64>,
-    /// 95 % interval of `shrink`.
-    pub ci95: Option<[f64; 2]>,
-}
-
-impl Change {
-    /// That of a model that was left as it is.
-    pub fn undo(&mut self) {
-        self.after = self.before;
-        self.shrink = self.before.map(|_| 0.0);
-        self.ci95 = None;
-    }
-
-    /// The gap before and after, NaN where it is unknown: for arithmetic and for printing.
-    pub fn gaps(&self) -> [f64; 2] {
-        [self.before, self.after].map(|gap| gap.unwrap_or(f64::NAN))
-    }
-}
-
-/// A gap before and after at one horizon.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct HorizonChange {
-    /// Horizon, s.
-    pub horizon: f64,
-    /// The change.
-    #[serde(flatten)]
-    pub change: Change,
-}
-
-/// Reference figures, in the measure of `torque.after`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Reference {
-    /// What noise alone gives.
-    pub noise_floor: f64,
-    /// A residual network on top of the nominal model, held out; `None` where it was not trained.
-    pub residual_network: Option<f64>,
-    /// A network alone, (q, q̇, q̈) to torque, held out; `None` where it was not trained.
-    pub pure_network: Option<f64>,
-}
-
 /// A motion that would separate what the logs cannot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NextExperiment {
@@ -470,59 +343,4 @@ pub struct LogEvaluation {
     pub torque: TorqueGap,
     /// Change of the weighted torque gap; `None` without a corrected model.
     pub shrink: Option<Change>,
-}
-
-/// What the report draws beside the diagnosis; not part of the public JSON.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Evidence {
-    /// One entry per joint, model order.
-    pub torque: Vec<Series>,
-    /// One entry per effect and joint, strongest effect first.
-    pub curves: Vec<EffectCurve>,
-    /// Gap of the corrected model on the same held-out data, in the form of `Diagnosis::gap`; `None` where no effect was found.
-    pub remaining: Option<Gap>,
-    /// Robot description as given on the command line; empty where unknown.
-    pub robot_file: String,
-    /// Logs as given on the command line; may be empty.
-    pub logs: Vec<String>,
-    /// The corrected model written beside the report, e.g. `corrected.json`; empty where none was written.
-    pub corrected_file: String,
-}
-
-/// Measured and modelled quantity of one joint over time, thinned for drawing: torque, by held-out fits, or position.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Series {
-    /// Joint name.
-    pub joint: String,
-    /// `N m` or `N`; of position `rad` or `m`.
-    pub unit: String,
-    /// Time over all episodes one after another, s.
-    pub time: Vec<f64>,
-    /// Measured; torque is band-limited.
-    pub measured: Vec<f64>,
-    /// Nominal model.
-    pub nominal: Vec<f64>,
-    /// Corrected model; empty where there is none.
-    pub corrected: Vec<f64>,
-    /// Indices at which a new episode begins.
-    pub breaks: Vec<usize>,
-}
-
-/// The law of one effect at one joint with the data behind it.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct EffectCurve {
-    /// Public name of the effect.
-    pub kind: String,
-    /// Joint name.
-    pub joint: String,
-    /// Quantity on the horizontal axis with its unit, e.g. `speed, rad/s`.
-    pub x_label: String,
-    /// Unit of the torque on the vertical axis.
-    pub unit: String,
-    /// Partial residuals: horizontal value, measured torque less all other effects and the nominal model. At most some thousand points.
-    pub data: Vec<[f64; 2]>,
-    /// The fitted law, sorted by the horizontal value.
-    pub law: Vec<[f64; 2]>,
-    /// Where the law lies within its parameters' intervals: horizontal value, least, greatest. Empty where it is not known.
-    pub band: Vec<[f64; 3]>,
 }

@@ -1,7 +1,6 @@
 //! How far a motor turns ahead of its link along a measured run.
 
 use crate::filter::{first_derivative, first_order, second_derivative, smoothed};
-use crate::plant::CONTACT;
 use crate::{Candidate, EncoderSide, Kind, Motion};
 use gapscope_dynamics::{Data, Model};
 use nalgebra::DMatrix;
@@ -13,6 +12,12 @@ mod oscillator;
 
 pub(crate) use oscillator::Oscillator;
 
+/// Resonance of the link on its locked motor once the play is taken up, Hz, where no elasticity says otherwise;
+/// and the damping ratio of that contact.
+pub(crate) const CONTACT: (f64, f64) = (20.0, 0.05);
+/// Damping ratio of the link on its locked motor behind a spring that is taken for granted where a log is explained: a log
+/// hardly tells it.
+pub(crate) const SPRING_DAMPING: f64 = 0.05;
 /// Damping ratio of the flattest response (Butterworth).
 const FLAT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Torque that shows play to be taken up, over what would wind the coupling by half the gap.
@@ -47,9 +52,7 @@ impl Coupling {
     fn of(drive: &Candidate) -> Option<Coupling> {
         let (frequency, ratio) = CONTACT;
         match drive.kind {
-            Kind::JointElasticity => {
-                Some(Coupling::resonant(drive.inertia, drive.shape, crate::joint_elasticity::RATIO))
-            }
+            Kind::JointElasticity => Some(Coupling::resonant(drive.inertia, drive.shape, SPRING_DAMPING)),
             Kind::Backlash => {
                 let contact = Coupling::resonant(drive.inertia, frequency, ratio);
                 Some(Coupling { half_gap: 0.5 * drive.shape, ..contact })
@@ -167,7 +170,7 @@ pub struct JointRun {
 impl JointRun {
     /// What a drive leaves, N m (N): the elasticity or play of a candidate at its knob with a rotor of some inertia, kg m²
     /// (kg), or a rigid one with that rotor where the candidate is of another kind. Play and spring to the side of the
-    /// transmission that the candidate has, as [`crate::Plant::residuals`] has them for this joint alone.
+    /// transmission that the candidate has, as a plant has them for this joint alone.
     pub fn left_by(&self, drive: &Candidate, rotor: f64) -> Vec<f64> {
         JointRun::left_by_each(&[(self, drive, rotor)]).pop().unwrap_or_default()
     }
@@ -399,7 +402,7 @@ mod tests {
     #[test]
     fn friction_opposes_the_link_and_not_the_motor_that_is_logged() {
         let (inertia, rotor, friction, dt) = (0.2, 0.3, 1.5, 1e-3);
-        let coupling = Coupling::resonant(inertia, 4.0, crate::joint_elasticity::RATIO);
+        let coupling = Coupling::resonant(inertia, 4.0, SPRING_DAMPING);
         let omega = TAU * 0.7;
         let motor = |t: f64| {
             [0.6 * (omega * t).sin(), 0.6 * omega * (omega * t).cos(), -0.6 * omega.powi(2) * (omega * t).sin()]

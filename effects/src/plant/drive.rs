@@ -1,8 +1,6 @@
 //! A joint whose motor turns on its own: a spring with damping, or play, between motor and link.
 
-/// Resonance of the link on its locked motor once the play is taken up, Hz, where no elasticity says otherwise;
-/// and the damping ratio of that contact.
-pub(crate) const CONTACT: (f64, f64) = (20.0, 0.05);
+use crate::wind_up::CONTACT;
 
 /// The wind-up δ = motor − link of one joint, both on the joint's side of the gear, and what acts along it.
 #[derive(Debug, Clone, PartialEq)]

@@ -13,13 +13,12 @@ mod residual;
 mod state;
 mod step;
 
-pub(crate) use drive::CONTACT;
 pub use drive::Transmission;
 pub use elements::Elements;
 pub use friction::{Bristle, Direction};
 
-use crate::effect::check;
-use crate::{Effect, EffectError, Kind};
+use crate::error::{EffectError, check};
+use crate::kind::Kind;
 pub use actuation::Actuation;
 use drive::Drive;
 use friction::Row;
@@ -114,22 +113,8 @@ impl Plant {
         plant
     }
 
-    /// The robot with effects. `dt` is the length of a step in s.
-    ///
-    /// # Errors
-    /// An effect names a joint that the robot does not have, or has a parameter outside its physical bounds.
-    pub fn new(model: &Model, effects: &[Effect], dt: f64) -> Result<Plant, EffectError> {
-        let mut plant = Plant::bare(model, dt);
-        for effect in effects {
-            effect.law().install(&mut plant)?;
-        }
-        plant.check_friction()?;
-        plant.assemble();
-        Ok(plant)
-    }
-
     /// Friction that would drive a joint is no friction. What rounding leaves below zero is taken as zero.
-    fn check_friction(&mut self) -> Result<(), EffectError> {
+    pub(crate) fn check_friction(&mut self) -> Result<(), EffectError> {
         for direction in &mut self.directions {
             let declared = match direction.parts.as_slice() {
                 &[(j, _)] => (self.model.joints()[j].damping, self.model.joints()[j].friction),
@@ -147,7 +132,7 @@ impl Plant {
         Ok(())
     }
 
-    fn bare(model: &Model, dt: f64) -> Plant {
+    pub(crate) fn bare(model: &Model, dt: f64) -> Plant {
         let n = model.dof();
         let mut plant = Plant {
             dt,
@@ -180,7 +165,7 @@ impl Plant {
     }
 
     /// Settles what depends on several effects: rotors of drives, rows of the friction solver, sizes of buffers.
-    fn assemble(&mut self) {
+    pub(crate) fn assemble(&mut self) {
         let n = self.model.dof();
         let middle: Vec<f64> = self
             .model

@@ -105,7 +105,7 @@ fn rubs_and_catches_at_every_place_are_friction_and_a_bias() {
     let range = Range { speed: 2.0, least: 0.0, span: 0.8, torque: 1.0, duration: 1.0 };
     let sum = |kind: Kind| -> Vec<f64> {
         let mut sum = vec![0.0; SAMPLES];
-        for place in Candidate::places(kind, 1, &range) {
+        for place in Candidate::scanned(kind, 1, &range) {
             let columns = run.columns(&place);
             sum.iter_mut().zip(&columns[0].rows[0].1).for_each(|(sum, x)| *sum += x);
         }
@@ -115,5 +115,5 @@ fn rubs_and_catches_at_every_place_are_friction_and_a_bias() {
         assert!((rub - v.signum()).abs() < 1e-9 && (caught + 1.0).abs() < 1e-9);
     }
     let still = Range { span: f64::INFINITY, ..range };
-    assert!(Candidate::places(Kind::Rub, 1, &still).len() <= 1, "no range, no grid");
+    assert!(Candidate::scanned(Kind::Rub, 1, &still).len() <= 1, "no range, no grid");
 }

@@ -142,13 +142,17 @@ fn the_column_of_a_lag_is_nearly_what_it_adds() {
 #[test]
 fn knobs_lie_in_the_range_of_the_joint() {
     let range = Range { speed: 2.0, least: -0.7, span: 1.5, torque: 30.0, duration: 10.0 };
-    for candidate in Candidate::knobs(std::slice::from_ref(&range)).into_iter().chain(Candidate::ripples(0, &range)) {
+    for candidate in Candidate::knobs(std::slice::from_ref(&range)).into_iter().chain(Candidate::scanned(
+        Kind::TorqueRipple,
+        0,
+        &range,
+    )) {
         assert!(candidate.shape.is_finite() && candidate.shape > 0.0, "{candidate:?}");
     }
     let idle = Range { speed: 0.0, least: 0.0, span: 0.0, torque: 0.0, duration: 0.0 };
     let kinds: Vec<Kind> = Candidate::knobs(std::slice::from_ref(&idle)).iter().map(|c| c.kind).collect();
     assert!(kinds.iter().all(|k| matches!(k, Kind::ActuationDelay | Kind::ActuatorLag)), "{kinds:?}");
-    assert!(Candidate::ripples(0, &idle).is_empty());
+    assert!(Candidate::scanned(Kind::TorqueRipple, 0, &idle).is_empty());
 }
 
 /// A joint looked at alone, all else along its measured motion, leaves what the whole plant leaves of it.

@@ -173,7 +173,6 @@ fn written() -> Vec<(Kind, Effect, Value)> {
 #[test]
 fn every_kind_is_written_under_its_public_names() {
     let written = written();
-    assert_eq!(written.iter().map(|(kind, ..)| *kind).collect::<Vec<_>>(), Kind::LINEAR);
     for (kind, effect, expected) in written {
         assert_eq!(effect.kind(), kind);
         assert_eq!(serde_json::to_value(&effect).unwrap(), expected);

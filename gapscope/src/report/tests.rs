@@ -3,6 +3,7 @@
 use super::*;
 use gapscope_diagnosis::schema::FoundEffect;
 use gapscope_diagnosis::schema::Parameter;
+use gapscope_effects::Kind;
 
 /// Elements that HTML closes by itself.
 const VOID: [&str; 4] = ["meta", "input", "br", "link"];
@@ -78,40 +79,16 @@ fn every_verdict_is_well_formed_finite_small_and_repeatable() {
 
 #[test]
 fn holds_every_effect_of_the_catalogue() {
-    let kinds = [
-        "viscous_friction",
-        "coulomb_friction",
-        "stribeck_friction",
-        "load_dependent_friction",
-        "presliding_friction",
-        "thermal_drift",
-        "payload",
-        "link_inertia_error",
-        "armature",
-        "gravity_misalignment",
-        "torque_gain_error",
-        "torque_bias",
-        "actuation_delay",
-        "actuator_lag",
-        "torque_saturation",
-        "torque_ripple",
-        "joint_elasticity",
-        "backlash",
-        "parallel_spring",
-        "joint_zero_offset",
-        "external_contact",
-        "joint_coupling",
-        "from_a_later_version",
-    ];
+    let kinds: Vec<&str> = Kind::ALL.iter().map(|kind| kind.name()).chain(["from_a_later_version"]).collect();
     let (_, mut diagnosis, evidence) = sample::explained();
     let pattern = diagnosis.effects[0].clone();
     diagnosis.effects = kinds.iter().map(|kind| FoundEffect { kind: (*kind).into(), ..pattern.clone() }).collect();
     let page = html(&diagnosis, &evidence, &Setting::default());
     check_balance("catalogue", &page);
-    for kind in kinds {
+    for kind in &kinds {
         assert!(page.contains(&format!("<code>{kind}</code>")), "{kind}");
         assert!(page.contains(&words::capital(&words::effect(kind))), "{kind}");
-        assert!(kind == "from_a_later_version" || !words::meaning(kind).is_empty(), "{kind}");
+        assert!(*kind == "from_a_later_version" || !words::meaning(kind).is_empty(), "{kind}");
     }
 }
 

@@ -2,22 +2,11 @@
 
 use super::format::{self, percent, plain, with_unit};
 use gapscope_diagnosis::schema::{Bounds, Evidence, Regime, Unexplained, Verdict};
+use gapscope_effects::Kind;
 
 /// An effect's public name in words, lower case but for names of people.
 pub fn effect(kind: &str) -> String {
-    match kind {
-        "coulomb_friction" => "Coulomb friction".into(),
-        "stribeck_friction" => "Stribeck friction".into(),
-        "load_dependent_friction" => "load-dependent friction".into(),
-        "link_inertia_error" => "link mass or inertia error".into(),
-        "armature" => "rotor inertia (armature)".into(),
-        "gravity_misalignment" => "tilted base".into(),
-        "torque_gain_error" => "torque gain error".into(),
-        "parallel_spring" => "spring across the joint".into(),
-        "joint_zero_offset" => "encoder zero offset".into(),
-        "joint_coupling" => "joint coupling".into(),
-        other => other.replace('_', " "),
-    }
+    Kind::named(kind).map_or_else(|| kind.replace('_', " "), |kind| kind.card().words.into())
 }
 
 /// Effects in words, each once.
@@ -35,33 +24,11 @@ pub fn effects(kinds: &[String]) -> Vec<String> {
 /// What the real robot does that the model does not, in one clause; empty for kinds outside the catalogue.
 pub fn meaning(kind: &str) -> &'static str {
     match kind {
-        "viscous_friction" => "friction that grows with speed",
-        "coulomb_friction" => "constant friction against the motion; sticks at rest",
-        "stribeck_friction" => "dry friction that rises towards standstill",
-        "load_dependent_friction" => "friction that grows with the torque through the gear",
-        "presliding_friction" => "friction that is elastic before it slides",
-        "thermal_drift" => "friction that falls as the drive warms up",
-        "payload" => "a body at the flange that the model does not carry",
-        "link_inertia_error" => "a link's mass, centre of mass or inertia differs from the URDF",
-        "armature" => "rotor inertia behind the gear",
-        "gravity_misalignment" => "the base is not level, so gravity points elsewhere",
-        "torque_gain_error" => "the drive delivers a multiple of the effort logged",
-        "torque_bias" => "a constant effort is added to the one logged",
-        "actuation_delay" => "effort acts later than logged",
-        "actuator_lag" => "effort follows the log with a first-order lag",
-        "torque_saturation" => "the drive clips effort below what was logged",
-        "torque_ripple" => "effort that repeats with position: cogging or gear mesh",
-        "joint_elasticity" => "a spring between motor and link",
-        "backlash" => "play between motor and link",
-        "parallel_spring" => "a spring, cable or counterbalance across the joint",
-        "joint_zero_offset" => "the encoder's zero is off",
-        "external_contact" => "an outside force for some of the time",
         "servo_gain_error" => "the servo's proportional gain is not the one given",
         "servo_damping_error" => "the servo's derivative gain or back-EMF is not the one given",
         "speed_limit" => "the drive turns no faster than this",
         "dead_band" => "the servo does nothing within an error of this size",
-        "joint_coupling" => "friction or inertia on a sum of two joint speeds",
-        _ => "",
+        other => Kind::named(other).map_or("", |kind| kind.card().meaning),
     }
 }
 
@@ -128,7 +95,7 @@ const LEARNED: f64 = 0.1;
 pub fn rest(left: &Unexplained, joint_names: &[String]) -> String {
     if let Some(like) = left.resembles.as_ref().filter(|like| like.share > LEARNED) {
         let laws: Vec<String> =
-            like.laws.iter().map(|l| format!("{} ({})", law(&l.law), joints(&l.joints, joint_names))).collect();
+            like.laws.iter().map(|l| format!("{} ({})", effect(&l.law), joints(&l.joints, joint_names))).collect();
         let share = percent(like.share);
         return format!(
             "What is left resembles {}: {share} of it; no effect of the catalogue does.",
@@ -139,18 +106,6 @@ pub fn rest(left: &Unexplained, joint_names: &[String]) -> String {
         return "A network finds next to nothing in what is left.".into();
     }
     format!("A network can still predict {} of what is left from the motion of the moment.", percent(left.learnable))
-}
-
-/// A law outside the catalogue in words.
-fn law(name: &str) -> &str {
-    match name {
-        "link_drag" => "drag of a medium on a link",
-        "joint_drag" => "drag that grows faster than the joint's speed",
-        "swing" => "a mass that swings on a link",
-        "rub" => "dry friction at some places of a joint's travel",
-        "catch" => "torque at some places of a joint's travel",
-        other => other,
-    }
 }
 
 /// Why the list of effects is empty.

@@ -30,7 +30,8 @@ fn truth(sealed: &Path) -> Option<Truth> {
     }
     let [effect] = effects.as_slice() else { return None };
     let kind = effect["kind"].as_str().unwrap();
-    if !Kind::LINEAR.iter().any(|k| k.name() == kind) {
+    let is_linear = |kind: Kind| kind.card().weighs && !kind.card().is_late() && !kind.card().of_its_log;
+    if !Kind::named(kind).is_some_and(is_linear) {
         return None;
     }
     let names: Vec<String> =

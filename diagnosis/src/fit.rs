@@ -1,0 +1,11 @@
+//! From a set of candidates to coefficients, effects and what they leave.
+
+pub mod break_away;
+pub mod estimate;
+pub mod held;
+pub mod plant;
+pub mod problem;
+pub mod refine;
+#[cfg(test)]
+pub mod support;
+pub mod terms;

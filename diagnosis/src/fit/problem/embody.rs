@@ -1,0 +1,126 @@
+//! Fits whose links are bodies: to the deviance comes, for each link, a little of its log-det divergence from the URDF
+//! ([`gapscope_effects::Body`]), and Newton's method with a line search finds the least of the sum.
+
+use super::Problem;
+use crate::numbers::decide::BODIES_PULL;
+use gapscope_effects::Body;
+use nalgebra::{DMatrix, DVector};
+
+/// Steps, at most, halvings of a step, at most, and the rise of the sum, nats, from which on it has settled.
+const STEPS: usize = 40;
+const HALVINGS: usize = 30;
+const SETTLED: f64 = 1e-6;
+
+/// A link, and where among some columns stand the ten numbers that add to it, an error and what it carries.
+struct Link<'a> {
+    body: &'a Body,
+    at: Vec<usize>,
+}
+
+impl Link<'_> {
+    fn more(&self, theta: &DVector<f64>) -> [f64; 10] {
+        std::array::from_fn(|i| self.at.iter().map(|at| theta[at + i]).sum())
+    }
+}
+
+impl Problem {
+    /// The least of deviance and divergence, from the least of the deviance alone.
+    pub(super) fn embody(
+        &self,
+        columns: &[usize],
+        gram: &DMatrix<f64>,
+        moment: &DVector<f64>,
+        held: &mut [Option<f64>],
+        theta: Vec<f64>,
+    ) -> Vec<f64> {
+        let links = self.links(columns, &theta);
+        if links.is_empty() {
+            return theta;
+        }
+        let mut here = DVector::from_vec(theta);
+        for link in &links {
+            // Towards the URDF until it is a body.
+            while link.body.divergence(&link.more(&here)).is_none() {
+                link.at.iter().for_each(|&at| (at..at + 10).for_each(|i| here[i] *= 0.5));
+            }
+        }
+        let sum = |theta: &DVector<f64>| -> f64 {
+            let divergence = |link: &Link| link.body.divergence(&link.more(theta)).map_or(f64::INFINITY, |d| d.value);
+            let fit = 0.5 * theta.dot(&(gram * theta)) - moment.dot(theta);
+            fit + BODIES_PULL * links.iter().map(divergence).sum::<f64>()
+        };
+        let mut least = sum(&here);
+        for _ in 0..STEPS {
+            let (mut curved, mut pull) = (gram.clone(), moment.clone());
+            for link in &links {
+                let Some(divergence) = link.body.divergence(&link.more(&here)) else { continue };
+                let (gradient, hessian) = (divergence.gradient * BODIES_PULL, divergence.hessian * BODIES_PULL);
+                let own: DVector<f64> = DVector::from_row_slice(&link.more(&here));
+                let target = hessian * own - gradient;
+                for &a in &link.at {
+                    for i in 0..10 {
+                        pull[a + i] += target[i];
+                        for &b in &link.at {
+                            (0..10).for_each(|k| curved[(a + i, b + k)] += hessian[(i, k)]);
+                        }
+                    }
+                }
+            }
+            let step = DVector::from_vec(self.descend(columns, &curved, &pull, held)) - &here;
+            let tried = (0..HALVINGS).map(|halvings| &here + &step * 0.5f64.powi(halvings as i32));
+            let Some((next, value)) =
+                tried.map(|next| (sum(&next), next)).find(|(value, _)| *value < least).map(|(v, n)| (n, v))
+            else {
+                break;
+            };
+            let settled = least - value < SETTLED;
+            (here, least) = (next, value);
+            if settled {
+                break;
+            }
+        }
+        here.iter().copied().collect()
+    }
+
+    /// The links that some columns add to. A load that is there is a body of its own and no part of its link; one that is
+    /// missing leaves the link that it is missing from.
+    fn links(&self, columns: &[usize], theta: &[f64]) -> Vec<Link<'_>> {
+        let mut links: Vec<Link> = Vec::new();
+        for (link, body) in self.bodies.iter().enumerate().filter_map(|(link, body)| Some((link, body.as_ref()?))) {
+            let adds = |e: &&super::Entry| e.candidate.link() == Some(link);
+            let place = |e: &super::Entry| columns.iter().position(|c| *c == e.columns.start);
+            let missing = |e: &super::Entry, at: usize| e.candidate.kind.is_calibration() || theta[at] < 0.0;
+            let at: Vec<usize> =
+                self.entries.iter().filter(adds).filter_map(|e| place(e).filter(|&at| missing(e, at))).collect();
+            if !at.is_empty() {
+                links.push(Link { body, at });
+            }
+        }
+        links
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::fit::support::fitted;
+    use gapscope_effects::{Body, Kind};
+
+    /// A torque that takes more away than the link has: least squares alone would leave it lighter than nothing.
+    #[test]
+    fn a_link_stays_a_body_whatever_the_logs_say() {
+        let model = gapscope_dynamics::robots::model("double_pendulum").unwrap().unwrap().model;
+        let body = Body::new(&model, 0).unwrap();
+        let (_, _, problem, fit) = fitted(Kind::LinkInertiaError, |s| {
+            let nominal = s.nominal[0].clone();
+            s.tau[0].iter_mut().zip(nominal).for_each(|(tau, nominal)| *tau -= 3.0 * nominal);
+        });
+        let own = |theta: &[f64]| -> [f64; 10] {
+            let at = problem.entries[0].columns.start;
+            let first = fit.columns.iter().position(|c| *c == at).unwrap();
+            std::array::from_fn(|i| theta[first + i])
+        };
+        assert!(body.divergence(&own(&fit.theta)).is_some(), "{:?}", fit.theta);
+        let free = problem.solve_unbounded(&fit.columns, &problem.total);
+        assert!(body.divergence(&own(&free)).is_none(), "{free:?}");
+    }
+}

@@ -1,0 +1,261 @@
+//! From a choice on a grid to the exact law: knobs turned to where they fit best, and torque that is not linear in the
+//! coefficients accounted for.
+
+use crate::fit::estimate::Fit;
+use crate::fit::plant::{plant_pushed, residual};
+use crate::fit::problem::Problem;
+use crate::fit::terms::Term;
+use crate::record::data::Data;
+use crate::record::signals::Signals;
+use gapscope_effects::{Candidate, Effect, EffectError, Kind, Motion, Plant};
+use rayon::prelude::*;
+
+/// Rounds, at most.
+const ROUNDS: usize = 8;
+/// Rounds, at least, where some torque bends with the coefficients.
+const ROUNDS_FOR_BENT: usize = 6;
+/// Relative change of a knob at which it has settled.
+const SETTLED: f64 = 2e-3;
+/// Rounds, at most, where a drive turns on its own: friction behind it comes nearer by a part of the way each time.
+const ROUNDS_OF_TURNING: usize = 20;
+/// Fall of the misfit, see [`Problem::misfit`], at which such an account has settled: half a nat.
+const SETTLED_MISFIT: f64 = 1.0;
+/// Times that a step which leaves more than the one before is halved.
+const HALVINGS: usize = 3;
+
+/// What the effects of a fit change of the residual, and the coefficients of the columns that stand for it.
+#[derive(Default)]
+pub struct Bend {
+    /// `[episode][joint][signal]`, N m or N.
+    change: Vec<Vec<Vec<f64>>>,
+    /// Of each entry of the fit's problem; none for a law outside the catalogue.
+    theta: Vec<Vec<f64>>,
+}
+
+/// The best point that a refinement came to.
+struct Reached {
+    /// What the plant leaves there, see [`Problem::misfit`].
+    misfit: f64,
+    /// See [`Fit::coefficients`].
+    coefficients: Vec<Vec<f64>>,
+}
+
+impl Data<'_> {
+    /// A problem of some terms, bent by what was found and weighed by what is left there. Before anything was found, a drive
+    /// that turns on its own has the rotor that its account begins with: by the signature of a rigid one it would be any.
+    fn about(&self, terms: Vec<Term>, found: Option<&Bend>) -> Problem {
+        let mut problem = self.problem(terms, &Kind::ALL);
+        let set: Vec<usize> = (0..problem.entries.len()).collect();
+        match found {
+            Some(found) => {
+                self.bent(&mut problem, &set, found);
+                problem.weigh(self.band, &set);
+            }
+            None => problem.begin_with_rotors(),
+        }
+        problem
+    }
+
+    /// A problem of some terms, weighed by what all those of some kinds leave.
+    pub fn problem(&self, terms: Vec<Term>, weighed_by: &[Kind]) -> Problem {
+        let mut problem =
+            Problem::new(self.model, self.signals, self.band, self.standstill, self.moving, terms, self.known);
+        let weighs = |c: &usize| weighed_by.contains(&problem.entries[*c].candidate.kind);
+        let set: Vec<usize> = (0..problem.entries.len()).filter(weighs).collect();
+        problem.weigh(self.band, &set);
+        problem
+    }
+
+    /// What the plant with the effects of a fit leaves of every run: `[episode][joint][signal]`, N m or N.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn rest(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Vec<Vec<f64>>>, EffectError> {
+        let (effects, side) = (fit.effects(problem, self.model), problem.side(&fit.set));
+        self.signals
+            .par_iter()
+            .map(|s| {
+                let mut plant = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
+                Ok(residual(&mut plant, self.model, s, self.standstill, fit.alignment()))
+            })
+            .collect()
+    }
+
+    /// What the effects of a fit change of the residual of every run, knobs where they stand.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn bend(&self, problem: &Problem, fit: &Fit) -> Result<Bend, EffectError> {
+        let effects = fit.effects(problem, self.model);
+        let side = problem.side(&fit.set);
+        let change = |s: &Signals| -> Result<Vec<Vec<f64>>, EffectError> {
+            let mut with = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
+            let mut exact = residual(&mut with, self.model, s, self.standstill, 0.0);
+            let nominal = residual(&mut Plant::nominal(self.model, s.dt), self.model, s, self.standstill, 0.0);
+            for (x, n) in exact.iter_mut().zip(&nominal) {
+                x.iter_mut().zip(n).for_each(|(x, n)| *x -= n);
+            }
+            Ok(exact)
+        };
+        let of_catalogue = |c: &usize| !problem.entries[*c].candidate.kind.is_outside();
+        let mut theta = vec![Vec::new(); problem.entries.len()];
+        for c in fit.set.iter().copied().filter(of_catalogue) {
+            theta[c] = fit.own(problem, c).1;
+            theta[c].truncate(problem.entries[c].columns.len() - usize::from(problem.entries[c].tangent));
+        }
+        Ok(Bend { change: self.signals.par_iter().map(change).collect::<Result<_, _>>()?, theta })
+    }
+
+    /// Bends a problem by what was found, `places` telling where its entries stand in that problem.
+    pub fn bent(&self, problem: &mut Problem, places: &[usize], bend: &Bend) {
+        let own = |(&c, theta): (&usize, &Vec<f64>)| {
+            problem.entries[c].columns.clone().zip(theta.clone()).collect::<Vec<_>>()
+        };
+        let signature: Vec<(usize, f64)> = places.iter().zip(&bend.theta).flat_map(own).collect();
+        problem.bend(self.signals, self.band, self.standstill, &bend.change, &signature);
+    }
+
+    /// The signals, their gears loaded by the torque that the plant takes with all that a fit has. The torque is predicted
+    /// without the measured effort, whose noise would explain itself; only play is crossed as that effort drives its rotor.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn loaded(&self, problem: &Problem, fit: &Fit) -> Result<Vec<Signals>, EffectError> {
+        let candidate = |c: usize| &problem.entries[c].candidate;
+        let effects = fit.effects(problem, self.model);
+        let side = problem.side(&fit.set);
+        let crossed = effects.iter().any(|effect| effect.kind().card().turning.is_some_and(|turning| turning.jolts));
+        let early = |c: &usize| !candidate(*c).kind.card().on_effort;
+        let taken = Fit { set: fit.set.iter().copied().filter(early).collect(), ..fit.clone() };
+        let taken = taken.effects(problem, self.model);
+        self.signals
+            .par_iter()
+            .map(|s| {
+                let idle: Vec<Vec<f64>> = s.tau.iter().map(|tau| vec![0.0; tau.len()]).collect();
+                let torque = |effects: &[Effect], tau: &[Vec<f64>]| -> Result<Vec<Vec<f64>>, EffectError> {
+                    let mut plant = plant_pushed(self.model, effects, side, s.dt, &s.pushed)?;
+                    let rest = plant.residuals(&Motion { tau, held: None, ..s.motion(self.model, self.standstill) });
+                    let less = |(tau, rest): (&Vec<f64>, &Vec<f64>)| tau.iter().zip(rest).map(|(t, r)| t - r).collect();
+                    Ok(tau.iter().zip(&rest).map(less).collect())
+                };
+                Ok(Signals {
+                    load: Some(torque(&effects, if crossed { &s.tau } else { &idle })?),
+                    taken: Some(torque(&taken, if crossed { &s.tau } else { &idle })?),
+                    drives: plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?.drives(),
+                    ..s.clone()
+                })
+            })
+            .collect()
+    }
+
+    /// The problem of some candidates alone, linear about the parameters that fit best, and the fit (Gauss–Newton in the
+    /// knobs, chords in what else bends; friction under load about the load that [`Data::loaded`] tells).
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn refine(&self, candidates: &[Candidate]) -> Result<(Problem, Fit), EffectError> {
+        let mut terms: Vec<Term> = candidates.iter().map(|c| Term { candidate: c.clone(), tangent_at: None }).collect();
+        let set: Vec<usize> = (0..terms.len()).collect();
+        let mut found: Option<Bend> = None;
+        let bends = candidates.iter().any(|c| c.kind.card().bends);
+        let least = if bends { ROUNDS_FOR_BENT } else { 1 };
+        let loads = candidates.iter().any(|c| c.kind.card().reads_torque);
+        let turns = candidates.iter().any(Candidate::turns);
+        let most = if turns { ROUNDS_OF_TURNING } else { ROUNDS };
+        let mut settled = !turns;
+        let mut reached: Option<Reached> = None;
+        let mut loaded: Option<Vec<Signals>> = None;
+        let mut round = 0;
+        loop {
+            let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
+            let problem = data.about(terms.clone(), found.as_ref());
+            let mut fit = Fit::on_all(&problem, &set);
+            let mut change = 0.0f64;
+            for (i, term) in terms.iter_mut().enumerate() {
+                let (_, theta) = fit.own(&problem, i);
+                let entry = &problem.entries[i];
+                let before = term.candidate.shape;
+                if let Some(next) = term.candidate.secant(&theta) {
+                    term.candidate.shape = next;
+                    change = change.max((next / before - 1.0).abs());
+                } else if let Some((low, high)) = term.candidate.kind.card().turned_by_tangent() {
+                    if let (true, Some((by, rest))) = (entry.tangent, theta.split_last()) {
+                        let (low, high) = (low * candidates[i].shape, high * candidates[i].shape);
+                        term.candidate.shape = (before + by).clamp(low, high);
+                        term.tangent_at = Some(rest.to_vec());
+                        change = change.max((term.candidate.shape / before - 1.0).abs());
+                    } else {
+                        let one = term.candidate.kind.card().unit_coefficient;
+                        term.tangent_at = Some(if one { vec![1.0] } else { theta });
+                        change = 1.0;
+                    }
+                }
+            }
+            if round >= most || (round >= least && change < SETTLED && settled) {
+                let mut problem = problem;
+                if let Some(last) = &reached {
+                    let mut there = problem.clone();
+                    data.bent(&mut there, &set, &data.bend(&problem, &fit)?);
+                    if there.misfit(&fit, self.band) > last.misfit {
+                        fit.move_to(&problem, &last.coefficients, 1.0);
+                    }
+                }
+                data.break_away(&mut problem, &fit)?;
+                problem.split(self.band);
+                return Ok((problem, fit));
+            }
+            let (mut problem, mut at) = (problem, fit.clone());
+            if change > 0.0 {
+                // Curvature belongs to the knobs as they will be.
+                let plain = terms.iter().map(|t| Term { tangent_at: None, ..t.clone() }).collect();
+                problem = data.about(plain, found.as_ref());
+                at = Fit::on_all(&problem, &set);
+            }
+            if loads {
+                loaded = Some(self.loaded(&problem, &at)?);
+            }
+            let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
+            let mut bend = Bend::default();
+            if turns {
+                // What turns on its own bends so much that a whole step may lead away, or fall far short.
+                let mut there = problem.clone();
+                let mut look = |at: &Fit| -> Result<(Bend, f64), EffectError> {
+                    let bend = data.bend(&problem, at)?;
+                    data.bent(&mut there, &set, &bend);
+                    Ok((bend, there.misfit(at, self.band)))
+                };
+                let (mut here, mut misfit) = look(&at)?;
+                if let Some(last) = &reached {
+                    let mut farther = at.clone();
+                    farther.move_to(&problem, &last.coefficients, -1.0);
+                    if misfit < last.misfit {
+                        let (bend, left) = look(&farther)?;
+                        if left < misfit {
+                            (at, here, misfit) = (farther, bend, left);
+                        }
+                    }
+                    for _ in 0..HALVINGS {
+                        if misfit <= last.misfit {
+                            break;
+                        }
+                        at.move_to(&problem, &last.coefficients, 0.5);
+                        (here, misfit) = look(&at)?;
+                    }
+                    settled = last.misfit - misfit < SETTLED_MISFIT;
+                }
+                if settled && reached.as_ref().is_some_and(|last| misfit > last.misfit) {
+                    // No way down from where it is.
+                    round = ROUNDS_OF_TURNING;
+                    continue;
+                }
+                bend = here;
+                reached = Some(Reached { misfit, coefficients: at.coefficients(&problem) });
+            }
+            if !turns {
+                bend = data.bend(&problem, &at)?;
+            }
+            found = Some(bend);
+            round += 1;
+        }
+    }
+}

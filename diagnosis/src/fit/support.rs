@@ -1,0 +1,49 @@
+//! A problem for tests.
+
+use crate::fit::estimate::Fit;
+use crate::fit::problem::Problem;
+use crate::fit::terms::Term;
+use crate::record::band::Band;
+use crate::record::data::Data;
+use crate::record::signals::{Signals, standstill};
+use gapscope_datasets::{Recipe, generate};
+use gapscope_dynamics::robots;
+use gapscope_effects::{Candidate, Kind};
+
+/// A kind fitted to the first joint of a double pendulum, of logs to which something is done.
+pub(crate) fn fitted(kind: Kind, done: impl Fn(&mut Signals)) -> (Vec<Signals>, Band, Problem, Fit) {
+    fitted_as(Candidate::new(kind, vec![0]), done)
+}
+
+/// The same with one candidate.
+pub(crate) fn fitted_as(candidate: Candidate, done: impl Fn(&mut Signals)) -> (Vec<Signals>, Band, Problem, Fit) {
+    let model = robots::model("double_pendulum").unwrap().unwrap().model;
+    let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
+    let signals: Vec<Signals> = (1..4)
+        .map(|seed| {
+            let mut s = Signals::new(&model, &generate(&model, &[], seed, &recipe, "log").unwrap()).unwrap();
+            done(&mut s);
+            s
+        })
+        .collect();
+    let (band, still) = (Band::new(&signals), standstill(&signals, 2));
+    let data = Data {
+        model: &model,
+        signals: &signals,
+        band: &band,
+        standstill: &still,
+        moving: &[true; 2],
+        noise: &[1e-3; 2],
+        known: &crate::record::known::Known::default(),
+    };
+    let term = Term { candidate, tangent_at: None };
+    let mut problem = data.problem(vec![term], &Kind::ALL);
+    problem.split(&band);
+    let fit = Fit::on_all(&problem, &[0]);
+    (signals, band, problem, fit)
+}
+
+/// Torque on the first joint, from its velocity.
+pub(crate) fn torque(law: fn(f64) -> f64) -> impl Fn(&mut Signals) {
+    move |s| s.tau[0].iter_mut().zip(&s.v[0]).for_each(|(tau, v)| *tau += law(*v))
+}

@@ -1,0 +1,285 @@
+//! From logs to signals that can be compared with a model: smoothed, consistent, on a uniform grid.
+//!
+//! Position is the only measured motion that enters: velocity and acceleration are its derivatives under the same kernel
+//! that averages the effort. A measured velocity has more noise in the band, and where the loop is closed through it that
+//! noise is in the effort too, which biases every estimate (Janot, Vandanjon, Gautier 2014); it is checked against the
+//! position when logs are read, not used here.
+
+use crate::numbers::kernel::{Kernel, apply};
+use gapscope_datasets::{Episode, Uniform, resample};
+use gapscope_dynamics::{Data, Model};
+use gapscope_effects::{Held, Motion};
+use gapscope_rollout::Trajectory;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+
+/// Half-width of the kernel that forms derivatives, s; about 46 Hz.
+const DERIVATIVE_HALF_WIDTH: f64 = 0.010;
+/// The same in samples at least, so that derivatives of slow logs are smoothed too.
+const DERIVATIVE_REACH: f64 = 2.5;
+/// Fraction of a joint's rms speed below which it counts as standing: its sign is then mostly noise and transients.
+const STANDSTILL_FRACTION: f64 = 0.03;
+/// Speeds under this many standard deviations of their noise count as standing.
+const STANDSTILL_NOISE: f64 = 4.0;
+/// Rate of the smoothed signals, Hz, at most.
+const SIGNAL_RATE: f64 = 500.0;
+/// Time that the begin and the end of a push may be off by, s: half a row of the band.
+const EDGE: f64 = 0.02;
+
+/// One episode's signals. Joint-major: `q[j][k]`.
+#[derive(Debug, Clone)]
+pub struct Signals {
+    /// Name of the log.
+    pub name: String,
+    /// The uniform log itself, at its own rate.
+    pub raw: Uniform,
+    /// Sample of `raw` at which signal 0 sits, and raw samples per signal.
+    pub first: usize,
+    /// Raw samples per signal.
+    pub stride: usize,
+    /// Time from one signal to the next, s.
+    pub dt: f64,
+    /// Position, rad or m.
+    pub q: Vec<Vec<f64>>,
+    /// Velocity, rad/s or m/s.
+    pub v: Vec<Vec<f64>>,
+    /// Acceleration, rad/s² or m/s².
+    pub a: Vec<Vec<f64>>,
+    /// Effort at the raw rate, disturbance included, held from sample to sample, N m or N.
+    pub effort: Vec<Vec<f64>>,
+    /// Smoothed effort, N m or N.
+    pub tau: Vec<Vec<f64>>,
+    /// Rate of change of the effort, N m/s or N/s.
+    pub tau_rate: Vec<Vec<f64>>,
+    /// Torque of the nominal robot on this motion, damping and friction of its URDF included, N m or N.
+    pub nominal: Vec<Vec<f64>>,
+    /// Torque that loads the gears, N m or N, where it is known better than from the nominal robot.
+    pub load: Option<Vec<Vec<f64>>>,
+    /// Torque that the motion takes with what was found, N m or N, where that is known.
+    pub taken: Option<Vec<Vec<f64>>>,
+    /// Gain and bias (N m or N) of each joint's drive, where they are known.
+    pub drives: Vec<(f64, f64)>,
+    /// Standard deviation of the white noise of each joint's position, rad or m.
+    pub position_noise: Vec<f64>,
+    /// Standard deviation of the noise of each joint's velocity, rad/s or m/s.
+    pub velocity_noise: Vec<f64>,
+    /// Standard deviation of the noise of each joint's logged effort, sample by sample, N m or N.
+    pub effort_noise: Vec<f64>,
+    /// Weights of the kernel that averages held efforts.
+    pub held: Vec<f64>,
+    /// From when to when something outside may have pushed, s since the start of the episode.
+    pub pushed: Vec<[f64; 2]>,
+}
+
+impl Signals {
+    /// Signals of an episode, its position's glitches mended; `None` where it is shorter than the kernel.
+    pub fn new(model: &Model, episode: &Episode) -> Option<Signals> {
+        let episode = episode.without_glitches();
+        let dt = 1.0 / episode.rate();
+        let raw = resample(&episode, dt);
+        let kernel = derivative_kernel(dt);
+        let samples = raw.position.first().map_or(0, Vec::len);
+        let first = kernel.reach + 1;
+        if samples < 4 * first + 8 {
+            return None;
+        }
+        let n = model.dof();
+        let stride = ((1.0 / (SIGNAL_RATE * dt)).round() as usize).max(1);
+        let length = (samples - 2 * first).div_ceil(stride);
+        let filter = |weights: &[f64], x: &[f64], offset: usize| -> Vec<f64> {
+            (0..length).map(|k| apply(weights, x, first + k * stride - offset)).collect()
+        };
+        let each = |weights: &[f64], x: &[Vec<f64>], offset: usize| -> Vec<Vec<f64>> {
+            x.iter().map(|x| filter(weights, x, offset)).collect()
+        };
+        let effort: Vec<Vec<f64>> = match &raw.disturbance {
+            Some(d) => raw.effort.iter().zip(d).map(|(e, d)| e.iter().zip(d).map(|(e, d)| e + d).collect()).collect(),
+            None => raw.effort.clone(),
+        };
+        let q = each(&kernel.value, &raw.position, kernel.reach);
+        let v = each(&kernel.first, &raw.position, kernel.reach);
+        let a = each(&kernel.second, &raw.position, kernel.reach);
+        let tau = each(&kernel.held, &effort, kernel.reach + 1);
+        let rate_weights: Vec<f64> = {
+            let mut weights = kernel.first.clone();
+            weights.insert(0, 0.0);
+            weights
+        };
+        // The derivative of a held signal sits half a sample late, like the signal itself; fine for an alignment column.
+        let tau_rate = each(&rate_weights, &effort, kernel.reach + 1);
+        let gain = kernel.first.iter().map(|w| w * w).sum::<f64>().sqrt();
+        let position_noise: Vec<f64> = raw.position.iter().map(|x| white_noise(x)).collect();
+        let velocity_noise = position_noise.iter().map(|noise| noise * gain).collect();
+        let effort_noise = effort.iter().map(|x| white_noise(x)).collect();
+        let signal_dt = dt * stride as f64;
+        let mut signals = Signals {
+            name: episode.name.clone(),
+            raw,
+            first,
+            stride,
+            dt: signal_dt,
+            q,
+            v,
+            a,
+            effort,
+            tau,
+            tau_rate,
+            nominal: vec![Vec::with_capacity(length); n],
+            load: None,
+            taken: None,
+            drives: Vec::new(),
+            position_noise,
+            velocity_noise,
+            effort_noise,
+            held: kernel.held.clone(),
+            pushed: Vec::new(),
+        };
+        signals.fill_nominal(model);
+        Some(signals)
+    }
+
+    /// Signals of the same run with a part of the noise that its position has once more, white.
+    pub fn noisier(&self, model: &Model, episode: &Episode, part: f64, seed: u64) -> Option<Signals> {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let mut episode = episode.without_glitches();
+        for (x, size) in episode.position.iter_mut().zip(&self.position_noise) {
+            x.iter_mut().for_each(|x| *x += part * size * random.sample::<f64, _>(StandardNormal));
+        }
+        let signals = Signals::new(model, &episode)?;
+        Some(Signals { pushed: self.pushed.clone(), ..signals })
+    }
+
+    /// Rate of the torque that the motion takes of a joint, N m/s or N/s. The noise of the effort is not in it.
+    pub fn taken_rate(&self, joint: usize) -> Vec<f64> {
+        let taken = &self.taken.as_ref().unwrap_or(&self.nominal)[joint];
+        let at = |k: usize| taken[k.min(taken.len() - 1)];
+        (0..taken.len()).map(|k| (at(k + 1) - at(k.saturating_sub(1))) / (2.0 * self.dt)).collect()
+    }
+
+    /// Whether something outside may be about to push or to let go at sample `k`.
+    fn pushed_in_part(&self, k: usize) -> bool {
+        let time = self.time(k);
+        self.pushed.iter().flatten().any(|edge| (time - edge).abs() < EDGE)
+    }
+
+    /// The samples at which a joint slides and nothing outside begins or ends to push. A slow log is smoothed so widely that its effort before and after a reversal runs
+    /// together: there the sign of the speed says nothing for as long.
+    pub fn slides(&self, joint: usize, standstill: f64) -> Vec<bool> {
+        let stands: Vec<bool> = self.v[joint].iter().map(|v| v.abs() < standstill).collect();
+        let wide = (self.held.len() as f64 / 2.0 - 1.0) * self.raw.dt - DERIVATIVE_HALF_WIDTH;
+        // The sample beside a rest shares its differences with it.
+        let reach = (wide / self.dt).round().max(1.0) as usize;
+        let near = |k: usize| stands[k.saturating_sub(reach)..(k + reach + 1).min(stands.len())].iter().any(|s| *s);
+        (0..stands.len()).map(|k| !near(k) && !self.pushed_in_part(k)).collect()
+    }
+
+    /// Number of signals.
+    pub fn len(&self) -> usize {
+        self.q.first().map_or(0, Vec::len)
+    }
+
+    /// Time of sample `k`, s since the start of the episode.
+    pub fn time(&self, k: usize) -> f64 {
+        (self.first + k * self.stride) as f64 * self.raw.dt
+    }
+
+    /// The motion and the effort that rollouts are held against.
+    pub fn trajectory(&self) -> Trajectory<'_> {
+        Trajectory {
+            dt: self.raw.dt,
+            effort: &self.effort,
+            position: &self.q,
+            velocity: &self.v,
+            first: self.first,
+            stride: self.stride,
+        }
+    }
+
+    /// The motion that signatures read.
+    pub fn motion<'a>(&'a self, model: &'a Model, standstill: &'a [f64]) -> Motion<'a> {
+        Motion {
+            model,
+            q: &self.q,
+            v: &self.v,
+            a: &self.a,
+            tau: &self.tau,
+            nominal: &self.nominal,
+            load: self.load.as_ref().unwrap_or(&self.nominal),
+            taken: self.taken.as_ref().unwrap_or(&self.nominal),
+            drives: &self.drives,
+            effort_noise: &self.effort_noise,
+            held: Some(Held {
+                effort: &self.effort,
+                first: self.first - self.held.len() / 2,
+                stride: self.stride,
+                weights: &self.held,
+            }),
+            dt: self.dt,
+            start: self.time(0),
+            pushed: &self.pushed,
+            standstill,
+        }
+    }
+
+    /// Copies sample `k` of a joint-major signal.
+    pub fn gather(signal: &[Vec<f64>], k: usize, out: &mut [f64]) {
+        for (out, joint) in out.iter_mut().zip(signal) {
+            *out = joint[k];
+        }
+    }
+
+    fn fill_nominal(&mut self, model: &Model) {
+        let n = model.dof();
+        let mut data = Data::new(model);
+        let (mut q, mut v, mut a, mut tau) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        for k in 0..self.len() {
+            Signals::gather(&self.q, k, &mut q);
+            Signals::gather(&self.v, k, &mut v);
+            Signals::gather(&self.a, k, &mut a);
+            model.inverse_dynamics(&mut data, &q, &v, &a, &mut tau);
+            for (j, joint) in model.joints().iter().enumerate() {
+                self.nominal[j].push(tau[j] + joint.damping * v[j]);
+            }
+        }
+        for (j, joint) in model.joints().iter().enumerate().filter(|(_, joint)| joint.friction != 0.0) {
+            let sign: Vec<f64> = self.v[j].iter().map(|v| v.signum()).collect();
+            let smeared = self.motion(model, &[]).smeared(&sign, &self.v[j], 0.0);
+            self.nominal[j].iter_mut().zip(smeared).for_each(|(nominal, sign)| *nominal += joint.friction * sign);
+        }
+    }
+}
+
+/// The kernel that forms derivatives of a log sampled every `dt` s.
+pub fn derivative_kernel(dt: f64) -> Kernel {
+    Kernel::new(DERIVATIVE_HALF_WIDTH.max(DERIVATIVE_REACH * dt), dt)
+}
+
+/// Speed below which each joint counts as standing, from noise and typical speed over all episodes.
+pub fn standstill(signals: &[Signals], joints: usize) -> Vec<f64> {
+    (0..joints)
+        .map(|j| {
+            let (mut square, mut count, mut noise) = (0.0, 0usize, 0.0f64);
+            for s in signals {
+                square += s.v[j].iter().map(|v| v * v).sum::<f64>();
+                count += s.len();
+                noise = noise.max(s.velocity_noise[j]);
+            }
+            let rms = (square / count.max(1) as f64).sqrt();
+            (STANDSTILL_FRACTION * rms).max(STANDSTILL_NOISE * noise).max(1e-9)
+        })
+        .collect()
+}
+
+/// Standard deviation of white noise on a smooth signal, from the median size of its fourth differences (1, −4, 6, −4, 1).
+fn white_noise(x: &[f64]) -> f64 {
+    let mut size: Vec<f64> =
+        x.windows(5).map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs()).filter(|d| *d > 0.0).collect();
+    if size.is_empty() {
+        return 0.0;
+    }
+    let middle = size.len() / 2;
+    let (_, median, _) = size.select_nth_unstable_by(middle, f64::total_cmp);
+    // 70 = Σ of the squared weights; 0.6745 = median of |N(0, 1)|.
+    *median / (0.6745 * 70f64.sqrt())
+}

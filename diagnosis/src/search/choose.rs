@@ -1,0 +1,18 @@
+//! The search: which effects, at which parameters, from a first look at all of them to what the plant itself predicts.
+
+use crate::record::logs::{Progress, Record};
+use crate::search::chosen::Chosen;
+use gapscope_effects::EffectError;
+
+impl Record<'_> {
+    /// The problem of all candidates, the set chosen from it, and the problem of that set alone at its exact parameters.
+    pub(crate) fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let chosen = self.best_of(progress)?;
+        let chosen = self.delay_or_lag(chosen)?;
+        let chosen = self.drive(chosen, progress)?;
+        let chosen = self.likeliest(chosen, progress)?;
+        let chosen = self.needed(self.shown(chosen, progress)?, progress)?;
+        let chosen = self.sticking(chosen)?;
+        self.delay_or_lag(chosen)
+    }
+}

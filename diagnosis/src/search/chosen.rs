@@ -1,0 +1,95 @@
+//! A set of effects that was chosen, at its exact law.
+
+use crate::fit::estimate::Fit;
+use crate::fit::problem::Problem;
+use crate::fit::terms::Entry;
+use crate::numbers::decide::PRICE_OF_TURNING;
+use crate::search::climb;
+use crate::search::climb::{Choice, Competition};
+use gapscope_effects::{Candidate, Kind};
+
+/// What an account leaves: `[episode][joint][signal]`, N m or N.
+pub(crate) type Rest = Vec<Vec<Vec<f64>>>;
+
+/// What the search came to.
+pub(crate) struct Chosen {
+    /// Every candidate, around the parameters found.
+    pub all: Problem,
+    /// The set chosen from them.
+    pub choice: Choice,
+    /// The candidates of that set alone, at their exact parameters.
+    pub exact: Problem,
+    /// Their fit.
+    pub fit: Fit,
+    /// Noise floor of each joint.
+    pub noise: Vec<f64>,
+    /// Spring or play in the drive of a joint, in the place of its rotor.
+    pub turned: Option<Turned>,
+    /// Probability that a delay is a lag, or a lag a delay, where one is there and they were compared.
+    pub late_doubt: Option<f64>,
+    /// Springs and plays that were held against a rigid drive, and by how many nats each won.
+    pub tried: Vec<(Candidate, f64)>,
+    /// By how many nats the logs, held against the exact law, speak for each kind that was held so.
+    pub needed: Vec<(Kind, f64)>,
+}
+
+/// A drive that turns on its own.
+#[derive(Debug, Clone)]
+pub(crate) struct Turned {
+    /// The rotor's place among all candidates: by its column, with the rest bent, the choice sees the drive.
+    pub place: usize,
+    /// Spring or play, its knob known.
+    pub drive: Candidate,
+    /// By how many nats the best account with a rigid drive is less likely.
+    pub odds: f64,
+}
+
+impl Chosen {
+    /// Whether a law in it filters what was measured and is not in another.
+    pub(crate) fn filters_beyond(&self, other: &Chosen) -> bool {
+        let has = |e: &Entry| other.exact.entries.iter().any(|other| other.candidate == e.candidate);
+        self.exact.entries.iter().any(|e| e.candidate.kind.card().filters() && !has(e))
+    }
+
+    /// Log probability of the account before any log is seen.
+    pub(crate) fn prior(&self) -> f64 {
+        let drive = if self.turns() { PRICE_OF_TURNING + (self.noise.len() as f64).ln() } else { 0.0 };
+        Competition::new(&self.all).prior(&self.choice.set) - drive
+    }
+
+    /// The same with another choice among its candidates.
+    pub(crate) fn with(&self, choice: Choice, exact: Problem, fit: Fit) -> Chosen {
+        Chosen {
+            all: self.all.clone(),
+            choice,
+            exact,
+            fit,
+            noise: self.noise.clone(),
+            turned: self.turned.clone(),
+            late_doubt: None,
+            tried: self.tried.clone(),
+            needed: self.needed.clone(),
+        }
+    }
+
+    fn turns(&self) -> bool {
+        self.exact.entries.iter().any(|e| e.candidate.turns())
+    }
+
+    /// Whether it leaves some joint less than another account, by as much as concerns anyone.
+    pub(crate) fn concerns_beside(&self, other: &Chosen) -> bool {
+        climb::is_material(&self.exact, &other.exact.left(&other.fit), &self.exact.left(&self.fit))
+    }
+
+    /// Whether a drive turns on its own, and has the rotor that does.
+    pub(crate) fn has_rotor(&self) -> bool {
+        let rotor = |i: usize| self.fit.own(&self.exact, i).1.iter().all(|inertia| *inertia > 0.0);
+        (0..self.exact.entries.len()).any(|i| self.exact.entries[i].candidate.turns() && rotor(i))
+    }
+}
+
+/// The candidates of a set, a drive in the place of its rotor.
+pub(crate) fn with_drive(problem: &Problem, set: &[usize], turned: &Option<Turned>) -> Vec<Candidate> {
+    let own = |c: usize| turned.iter().find(|t| t.place == c).map(|t| t.drive.clone());
+    set.iter().map(|&c| own(c).unwrap_or_else(|| problem.entries[c].candidate.clone())).collect()
+}

@@ -1,0 +1,84 @@
+//! From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
+
+use crate::fit::estimate::Fit;
+use crate::fit::problem::Problem;
+use crate::fit::terms::{Entry, Term};
+use crate::record::data::Data;
+use crate::record::logs::{Progress, Record};
+use crate::search::chosen::{Chosen, Turned, with_drive};
+use crate::search::climb;
+use crate::search::climb::Choice;
+use gapscope_effects::{Candidate, EffectError, Kind};
+
+/// Times that the choice is made, each around the exact parameters of the one before.
+const ROUNDS: usize = 4;
+
+impl Record<'_> {
+    /// From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
+    pub(crate) fn converge(
+        &self,
+        mut all: Problem,
+        mut choice: Choice,
+        noise: Vec<f64>,
+        turned: Option<Turned>,
+        progress: Progress<'_>,
+    ) -> Result<Chosen, EffectError> {
+        let data = self.data(&noise);
+        let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
+        let mut round = 0;
+        let (exact, fit) = loop {
+            progress("refining effects", 0.3 + 0.08 * round as f64);
+            round += 1;
+            let (exact, fit) = data.refine(&with_drive(&all, &choice.set, &turned))?;
+            // The choice again, around the parameters found: knobs turned, and what bends taken into account.
+            let changes: Vec<(usize, Candidate)> = choice
+                .set
+                .iter()
+                .zip(&exact.entries)
+                .filter(|(_, e)| !e.candidate.turns())
+                .map(|(&c, e)| (c, e.candidate.clone()))
+                .collect();
+            if round == ROUNDS || choice.set.is_empty() {
+                break (exact, fit);
+            }
+            // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
+            let loaded = data.loaded(&exact, &fit)?;
+            let data = Data { signals: &loaded, ..data };
+            let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind.card().reads_torque;
+            let under_load = all.entries.iter().enumerate().filter(of_load);
+            let changes: Vec<(usize, Candidate)> =
+                under_load.map(|(c, e)| (c, e.candidate.clone())).chain(changes).collect();
+            all.replace(self.model, &loaded, &self.band, &self.still, &changes);
+            let at: Vec<usize> = (0..exact.entries.len()).collect();
+            let plain = data.problem(exact.entries.iter().map(|e| open(&e.candidate)).collect(), &Kind::ALL);
+            let mut plain_fit = Fit::on_all(&plain, &at);
+            carry(&fit, &exact, &plain, &mut plain_fit);
+            let found = data.bend(&plain, &plain_fit)?;
+            data.bent(&mut all, &choice.set, &found);
+            let again = climb::choose(&mut all, &self.band, &choice.set);
+            let same = again.set == choice.set;
+            choice = again;
+            if same {
+                break (exact, fit);
+            }
+        };
+        let (late_doubt, tried, needed) = (None, Vec::new(), Vec::new());
+        Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt, tried, needed })
+    }
+}
+
+/// Kinds by what all of which leave rows are weighed. A push is known by when it comes: it is no outlier.
+pub(crate) fn weighing() -> Vec<Kind> {
+    Kind::ALL.into_iter().chain(Kind::OUTSIDE).filter(|kind| kind.card().weighs).collect()
+}
+
+/// Puts the coefficients of a fit with tangents on the same candidates without them.
+fn carry(from: &Fit, with: &Problem, to: &Problem, fit: &mut Fit) {
+    for c in 0..to.entries.len() {
+        let (_, theta) = from.own(with, c);
+        let (at, _) = fit.own(to, c);
+        for (at, theta) in at.into_iter().zip(theta) {
+            fit.theta[at] = theta;
+        }
+    }
+}

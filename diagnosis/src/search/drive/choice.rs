@@ -1,0 +1,114 @@
+//! Whether a drive that turns on its own takes the place of a rigid one in what was chosen.
+
+use crate::fit::estimate::Fit;
+use crate::fit::problem::Problem;
+use crate::fit::terms::Term;
+use crate::numbers::decide::WORTH_A_LOOK;
+use crate::record::floor::noise_floor;
+use crate::record::logs::{Progress, Record};
+use crate::search::chosen::{Chosen, Turned, with_drive};
+use crate::search::climb;
+use crate::search::converge::weighing;
+use gapscope_effects::{Candidate, EffectError, Kind};
+
+/// Accounts of drives that are tried in each pass.
+const ACCOUNTS: usize = 2;
+
+impl Record<'_> {
+    /// Puts a spring or play in the drive of one joint where the logs speak for it: beside all else that was found, beside the
+    /// calibration alone, and where noise may have drowned what a spring does, through a filter.
+    pub(crate) fn drive(&self, rigid: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let mut joints = self.restless(&rigid)?;
+        // What was found beyond calibration may stand in for a drive.
+        if rigid.exact.entries.iter().any(|e| !e.candidate.kind.is_calibration() && !e.candidate.kind.is_outside()) {
+            joints.extend((0..self.model.dof()).filter(|j| self.moving[*j] && !joints.contains(j)).collect::<Vec<_>>());
+        }
+        if joints.is_empty() {
+            return Ok(rigid);
+        }
+        let further = |kind: Kind| !kind.is_calibration();
+        let calibrated = if climb::kinds(&rigid.all, &rigid.choice.set).into_iter().any(further) {
+            Some(self.calibrated(&rigid, progress)?)
+        } else {
+            None
+        };
+        let bases = [(Some(&rigid), false), (calibrated.as_ref(), false), (Some(&rigid), true)];
+        let mut best: Option<Chosen> = None;
+        let mut tried: Vec<(Candidate, f64)> = Vec::new();
+        for (base, through) in bases.into_iter().filter_map(|(base, through)| Some((base?, through))) {
+            if through && best.is_some() {
+                break;
+            }
+            let entries = &base.exact.entries;
+            let beside = (0..entries.len()).filter(|&i| !entries[i].candidate.kind.card().rotor).collect();
+            let others = (base.exact.clone(), Fit { set: beside, ..base.fit.clone() });
+            for account in self.accounts(&joints, &others.0, &others.1, through)?.into_iter().take(ACCOUNTS) {
+                let (all, place) = self.with_rotor(&rigid, account.drive.joints[0]);
+                let mut choice = base.choice.clone();
+                choice.set.push(place);
+                choice.set.sort_unstable();
+                choice.set.dedup();
+                let turned = Turned { place, drive: account.drive.clone(), odds: 0.0 };
+                // Beside what was found as it is, and with the choice made again around it.
+                let plain = self.data(&rigid.noise).refine(&with_drive(&all, &choice.set, &Some(turned.clone())))?;
+                let next = self.converge(all, choice.clone(), rigid.noise.clone(), Some(turned.clone()), progress)?;
+                let plain = Chosen { turned: Some(turned), ..next.with(choice, plain.0, plain.1) };
+                let next = if plain.odds_against(&next, self)? > 0.0 { plain } else { next };
+                if !next.has_rotor() {
+                    continue;
+                }
+                let odds = next.odds_against(best.as_ref().unwrap_or(&rigid), self)?;
+                tried.push((account.drive, odds));
+                if odds > 0.0 {
+                    best = Some(next);
+                }
+            }
+        }
+        let Some(best) = best else { return Ok(Chosen { tried, ..rigid }) };
+        // What else came with it may be as good beside a rigid drive.
+        let stiff = self.converge(best.all.clone(), best.choice.clone(), rigid.noise.clone(), None, progress)?;
+        let rigid = if stiff.odds_against(&rigid, self)? > 0.0 { stiff } else { rigid };
+        let odds = best.odds_against(&rigid, self)?;
+        if odds <= 0.0 || !best.concerns_beside(&rigid) {
+            return Ok(Chosen { tried, ..rigid });
+        }
+        let turned = best.turned.map(|turned| Turned { odds, ..turned });
+        Ok(Chosen { turned, tried, ..best })
+    }
+
+    /// The best account of calibration alone: what was found beyond it may stand in for a drive.
+    fn calibrated(&self, rigid: &Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let (mut all, mut choice) = (rigid.all.clone(), rigid.choice.clone());
+        all.closed.extend(all.entries.iter().map(|e| e.candidate.kind).filter(|kind| !kind.is_calibration()));
+        choice.set.retain(|&c| all.entries[c].candidate.kind.is_calibration());
+        self.converge(all, choice, rigid.noise.clone(), None, progress)
+    }
+
+    /// Joints of which more than noise is left, those with most of it first.
+    fn restless(&self, chosen: &Chosen) -> Result<Vec<usize>, EffectError> {
+        let rest = self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?;
+        let floor = noise_floor(&self.signals, &self.band, &rest, self.model.dof());
+        // Play shows for moments alone: what it leaves then counts in full.
+        let left = chosen.exact.left(&chosen.fit);
+        let calm = |j: usize| floor[j].min(chosen.exact.sigma[j]).max(f64::MIN_POSITIVE);
+        let level = |j: usize| left[j].sqrt() / calm(j);
+        let mut joints: Vec<usize> =
+            (0..self.model.dof()).filter(|&j| self.moving[j] && level(j) > WORTH_A_LOOK).collect();
+        joints.sort_by(|&a, &b| level(b).total_cmp(&level(a)));
+        Ok(joints)
+    }
+
+    /// All candidates of a choice, and among them the place of a joint's rotor, in case the choice was made without rotors.
+    fn with_rotor(&self, chosen: &Chosen, joint: usize) -> (Problem, usize) {
+        let rotor = Candidate::rotor(joint);
+        let entries = &chosen.all.entries;
+        if let Some(place) = entries.iter().position(|e| e.candidate == rotor) {
+            return (chosen.all.clone(), place);
+        }
+        let open = |candidate: Candidate| Term { candidate, tangent_at: None };
+        let candidates = entries.iter().map(|e| e.candidate.clone()).chain([rotor]);
+        let mut all = self.data(&chosen.noise).problem(candidates.map(open).collect(), &weighing());
+        all.closed.clone_from(&chosen.all.closed);
+        (all, entries.len())
+    }
+}

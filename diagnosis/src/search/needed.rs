@@ -1,0 +1,127 @@
+//! What was chosen held against the best accounts without each of its kinds, at the exact law.
+
+use crate::fit::estimate::speeds;
+use crate::numbers::decide::DOUBTFUL;
+use crate::record::logs::{Progress, Record};
+use crate::search::chosen::{Chosen, with_drive};
+use crate::search::climb;
+use crate::search::climb::Choice;
+use crate::search::rivals;
+use crate::search::rivals::Rival;
+use gapscope_effects::EffectError;
+
+/// Times that a likelier account takes the place of what was chosen.
+const AGAIN: usize = 2;
+impl Record<'_> {
+    /// The likeliest account: where the best one without a kind is likelier than what was chosen, that one.
+    pub(crate) fn likeliest(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        for _ in 0..AGAIN {
+            let mut rivals = rivals::rivals(&chosen.all, &chosen.choice);
+            rivals.sort_by(|a, b| a.odds.total_cmp(&b.odds));
+            let Some(rival) = rivals.into_iter().next().filter(|rival| rival.odds < 0.0) else { break };
+            let turned = chosen.turned.clone().filter(|turned| rival.choice.set.contains(&turned.place));
+            let next = self.converge(chosen.all.clone(), rival.choice, chosen.noise.clone(), turned, progress)?;
+            if next.odds_against(&chosen, self)? <= 0.0 {
+                break;
+            }
+            chosen = Chosen { tried: chosen.tried, ..next };
+        }
+        Ok(chosen)
+    }
+
+    /// What was chosen, each kind in it held at its exact law against the best accounts without it: without replacement, and
+    /// with whatever else takes its place. A kind that the logs do not speak for goes.
+    pub(crate) fn needed(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let own = chosen.turned.as_ref().map(|turned| turned.place);
+        let rivals = rivals::rivals(&chosen.all, &chosen.choice);
+        // What is rare is asked first: beside it, something common might seem to do nothing.
+        let mut kinds = climb::kinds(&chosen.all, &chosen.choice.set);
+        kinds.sort_by_key(|kind| (!kind.is_outside(), kind.is_calibration()));
+        for kind in kinds {
+            let rival = rivals.iter().find(|rival| rival.without == kind);
+            let of_kind = |c: &usize| chosen.all.entries[*c].candidate.kind == kind && Some(*c) != own;
+            let set: Vec<usize> = chosen.choice.set.iter().copied().filter(|c| !of_kind(c)).collect();
+            let clear = kind.is_calibration() && rival.is_some_and(|rival| rival.odds > DOUBTFUL);
+            if set.len() == chosen.choice.set.len() || clear {
+                continue;
+            }
+            let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
+            let without = chosen.with(Choice { set }, exact, fit);
+            let mut odds = chosen.odds_against(&without, self)?;
+            if odds <= 0.0 || !(kind.is_outside() || chosen.concerns_beside(&without)) {
+                chosen = without;
+                continue;
+            }
+            let doubtful = |rival: &&Rival| !kind.is_calibration() && odds.min(rival.odds) < DOUBTFUL;
+            if let Some(rival) = rival.filter(doubtful) {
+                let mut all = chosen.all.clone();
+                // A delay and a lag are told apart by other means.
+                all.closed.extend(climb::told_together(kind));
+                let choice = rival.choice.clone();
+                let next = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
+                let next = if next.turned.is_none() { self.drive(next, progress)? } else { next };
+                let over = chosen.odds_against(&next, self)?;
+                if over < 0.0 {
+                    // What lost may still stand beside what won.
+                    let mut set: Vec<usize> = chosen.choice.set.iter().copied().filter(of_kind).collect();
+                    set.extend(&next.choice.set);
+                    set.sort_unstable();
+                    set.dedup();
+                    let (exact, fit) = self.data(&next.noise).refine(&with_drive(&next.all, &set, &next.turned))?;
+                    let both = next.with(Choice { set }, exact, fit);
+                    let beside = both.odds_against(&next, self)?;
+                    let closed = std::mem::take(&mut chosen.all.closed);
+                    let (tried, mut needed) = (std::mem::take(&mut chosen.tried), std::mem::take(&mut chosen.needed));
+                    if beside > 0.0 {
+                        needed.push((kind, beside));
+                    }
+                    chosen = Chosen { tried, needed, ..if beside > 0.0 { both } else { next } };
+                    chosen.all.closed = closed;
+                    continue;
+                }
+                odds = odds.min(over);
+            }
+            chosen.needed.push((kind, odds));
+        }
+        Ok(chosen)
+    }
+
+    /// What was chosen without the candidates of which every interval holds nothing: what blocks of time do not agree on was
+    /// not shown by them. Links stay, of which the URDF says what they may be. Where nothing of a kind is left, what else there
+    /// is has its turn without it.
+    pub(crate) fn shown(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
+        let speeds = speeds(&self.signals, &self.band, self.model.dof());
+        for kind in climb::kinds(&chosen.all, &chosen.choice.set) {
+            // Candidates of a choice and entries at its exact law stand in one order.
+            let of_kind = |i: usize| {
+                let candidate = &chosen.exact.entries[i].candidate;
+                let is_link = kind.is_calibration() && candidate.link().is_some();
+                candidate.kind == kind && !candidate.turns() && !is_link && !kind.is_outside()
+            };
+            let own: Vec<usize> = (0..chosen.exact.entries.len()).filter(|&i| of_kind(i)).collect();
+            let halves = chosen.fit.half_widths(&chosen.exact, &own, &speeds);
+            let holds_nothing = |(i, half): &(&usize, Vec<f64>)| {
+                let (_, theta) = chosen.fit.own(&chosen.exact, **i);
+                theta.iter().zip(half).all(|(theta, half)| theta.abs() < *half)
+            };
+            let gone: Vec<usize> = own.iter().zip(halves).filter(holds_nothing).map(|(&i, _)| i).collect();
+            if gone.is_empty() {
+                continue;
+            }
+            let set =
+                chosen.choice.set.iter().enumerate().filter(|(i, _)| !gone.contains(i)).map(|(_, &c)| c).collect();
+            let choice = Choice { set };
+            if gone.len() < own.len() {
+                let candidates = with_drive(&chosen.all, &choice.set, &chosen.turned);
+                let (exact, fit) = self.data(&chosen.noise).refine(&candidates)?;
+                chosen = chosen.with(choice, exact, fit);
+                continue;
+            }
+            let mut all = chosen.all.clone();
+            all.closed.push(kind);
+            let next = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
+            chosen = Chosen { tried: chosen.tried, needed: chosen.needed, ..next };
+        }
+        Ok(chosen)
+    }
+}

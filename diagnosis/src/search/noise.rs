@@ -1,0 +1,159 @@
+//! What two accounts of the logs make of noise, and their residuals told at one noise.
+//!
+//! A law that filters what was measured (a spring, play, a lag) makes more of its noise at some frequencies and less at others.
+//! The probability of the logs is that of what is left times how far each sample of it moves with the effort that was
+//! logged (the Jacobian of a change of variables). So each account runs a second time with some noise more; where one makes
+//! more of it than the other, what it leaves is scaled down to what the other makes of it, frequency by frequency.
+
+use crate::numbers::decide::FILTER_KNOWN_TO;
+use crate::record::data::Data;
+use crate::record::frequency::{BANDS, Equalizer, in_frequency};
+use crate::record::logs::PART_OF_NOISE;
+use crate::record::logs::Record;
+use crate::record::rows;
+use crate::record::rows::Rows;
+use crate::record::signals::Signals;
+use crate::search::chosen::{Chosen, Rest};
+use gapscope_effects::EffectError;
+
+/// Part of what is left by which the effort is touched to see whether an account feels it: so little that no contact changes.
+const TOUCH: f64 = 1e-4;
+/// Part of a touch that is felt at least where an account predicts the effort.
+const FELT: f64 = 0.05;
+/// Rows to either side over which that is looked at.
+const NEAR: usize = 1;
+
+impl Record<'_> {
+    /// What brings the residuals of two accounts, each with what it leaves of every run, to one noise. Noise of the position is
+    /// white. Noise of the effort is as what is left by the account that leaves more, played backwards: the same spectrum,
+    /// which no law of the motion made.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub(crate) fn at_one_noise(&self, accounts: [(&Chosen, &Rest); 2]) -> Result<[Equalizer; 2], EffectError> {
+        let n = self.model.dof();
+        let rows = |rest: &Rest| -> Rows { (0..n).map(|j| self.sliding_rows(j, rest)).collect() };
+        let run = |chosen: &Chosen, signals: &[Signals]| {
+            let rest = Data { signals, ..self.data(&chosen.noise) }.rest(&chosen.exact, &chosen.fit)?;
+            Ok::<_, EffectError>(rows(&rest))
+        };
+        let plain = accounts.map(|(_, rest)| rows(rest));
+        let of_position = [run(accounts[0].0, &self.noisier)?, run(accounts[1].0, &self.noisier)?];
+        let mut noisier = self.noisier.clone();
+        for j in 0..n {
+            let left = |i: usize| PART_OF_NOISE * size(&plain[i][j]);
+            let more = usize::from(left(1) > left(0));
+            let position = size(&less(&of_position[more][j], &plain[more][j]));
+            let part = if left(more) > 0.0 { (1.0 - (position / left(more)).powi(2)).max(0.0).sqrt() } else { 0.0 };
+            for (s, rest) in noisier.iter_mut().zip(accounts[more].1) {
+                let backwards = rest[j].iter().rev();
+                s.tau[j].iter_mut().zip(backwards).for_each(|(tau, rest)| *tau += PART_OF_NOISE * part * rest);
+            }
+        }
+        let through = |i: usize| -> Result<Vec<[f64; BANDS]>, EffectError> {
+            let noisier = run(accounts[i].0, &noisier)?;
+            let of = |j: usize| {
+                let moved = self.levels(&less(&noisier[j], &plain[i][j]));
+                let left = [0, 1].map(|i: usize| self.levels(&plain[i][j]));
+                // Two runs of a play that hits its stops at other times differ by more than either leaves: that is no noise.
+                std::array::from_fn(|b| moved[b].min(left[0][b].max(left[1][b]) + PART_OF_NOISE.ln()))
+            };
+            Ok((0..n).map(of).collect())
+        };
+        let through = [through(0)?, through(1)?];
+        let filters = [0, 1].map(|i: usize| accounts[i].0.filters_beyond(accounts[1 - i].0));
+        let scale = |i: usize| {
+            let of = |j: usize| {
+                std::array::from_fn(|b| {
+                    let less = through[1 - i][j][b] - through[i][j][b];
+                    // In doubt for the account without the law.
+                    let doubt = if filters[1 - i] && !filters[i] { less.abs().min(FILTER_KNOWN_TO) } else { 0.0 };
+                    (less.min(0.0) - doubt).exp()
+                })
+            };
+            Equalizer((0..n).map(of).collect())
+        };
+        Ok([scale(0), scale(1)])
+    }
+
+    /// Rows at which what an account leaves does not hang on the effort, `[joint][row]`: behind a link whose play is open the
+    /// rotor flies as it is driven, and the account predicts no effort there.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub(crate) fn unpredicted(&self, chosen: &Chosen, rest: &Rest) -> Result<Vec<Vec<bool>>, EffectError> {
+        let rows = |rest: &Rest, j: usize| self.sliding_rows(j, rest);
+        let mut moved: Vec<Signals> = self.signals.clone();
+        for (s, rest) in moved.iter_mut().zip(rest) {
+            for (tau, rest) in s.tau.iter_mut().zip(rest) {
+                tau.iter_mut().zip(rest.iter().rev()).for_each(|(tau, rest)| *tau += TOUCH * rest);
+            }
+        }
+        let of = |j: usize, then: &Rest| {
+            let touched: Rest =
+                moved.iter().zip(&self.signals).map(|(then, now)| vec![less(&then.tau[j], &now.tau[j])]).collect();
+            let touched = self.sliding_rows_of(j, &touched, 0);
+            let felt = less(&rows(then, j), &rows(rest, j));
+            let near = |x: &[f64], i: usize| -> f64 {
+                x[i.saturating_sub(NEAR)..(i + NEAR + 1).min(x.len())].iter().map(|x| x * x).sum()
+            };
+            (0..felt.len()).map(|i| near(&felt, i) < FELT * FELT * near(&touched, i)).collect()
+        };
+        let then = Data { signals: &moved, ..self.data(&chosen.noise) }.rest(&chosen.exact, &chosen.fit)?;
+        Ok((0..self.model.dof()).map(|j| of(j, &then)).collect())
+    }
+
+    /// What is left of a joint at all rows, nothing where it rests.
+    fn sliding_rows(&self, joint: usize, rest: &Rest) -> Vec<f64> {
+        self.sliding_rows_of(joint, rest, joint)
+    }
+
+    /// The same of a signal in some place.
+    fn sliding_rows_of(&self, joint: usize, signals: &Rest, place: usize) -> Vec<f64> {
+        let of = |(e, (s, rest)): (usize, (&Signals, &Vec<Vec<f64>>))| {
+            let rows = self.band.filter_where(e, &s.slides(joint, self.still[joint]), &rest[place]);
+            rows.into_iter().map(|row| row.unwrap_or(0.0)).collect::<Vec<_>>()
+        };
+        self.signals.iter().zip(signals).enumerate().flat_map(of).collect()
+    }
+
+    /// Mean logarithm over blocks of time of the size of a signal at all rows, in each band of frequencies.
+    fn levels(&self, rows: &[f64]) -> [f64; BANDS] {
+        std::array::from_fn(|band| {
+            let mut part = rows.to_vec();
+            in_frequency(&self.band, &mut part, |of| f64::from(u8::from(of == band)));
+            let blocks = rows::squares(&self.band, &Rows::from([part]), |_| true);
+            let levels: Vec<f64> = blocks.iter().map(|b| 0.5 * (b[0] / b[1]).max(f64::MIN_POSITIVE).ln()).collect();
+            levels.iter().sum::<f64>() / levels.len().max(1) as f64
+        })
+    }
+}
+
+fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// Standard deviation of normal noise with outliers, where there is any.
+fn size(x: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = x.iter().map(|x| x.abs()).filter(|x| *x > 0.0).collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let middle = sizes.len() / 2;
+    // 0.6745 is the median of |N(0, 1)|.
+    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_size_of_noise_is_told_beside_outliers_and_rests() {
+        let mut noise: Vec<f64> = (0..1000).map(|i| if i % 2 == 0 { 0.6745 } else { -0.6745 }).collect();
+        noise.extend([50.0; 20]);
+        noise.extend([0.0; 500]);
+        assert!((size(&noise) - 1.0).abs() < 1e-9);
+        assert_eq!(size(&[0.0; 5]), 0.0);
+    }
+}

@@ -1,0 +1,98 @@
+//! What pushes from outside and what the robot itself lacks, told apart by turns: each stands out beside the other.
+
+use crate::fit::plant::residual;
+use crate::fit::terms::{Entry, Term};
+use crate::record::floor::noise_floor;
+use crate::record::logs::Record;
+use crate::record::rows;
+use crate::record::rows::Rows;
+use crate::record::signals::Signals;
+use crate::search::contact;
+use crate::search::contact::Left;
+use gapscope_effects::{Candidate, EffectError, Force, Kind, Motion, Plant};
+use rayon::prelude::*;
+
+/// Times, at most, that what pushes and what the robot lacks are told apart, each beside the other.
+const LOOKS: usize = 3;
+
+impl Record<'_> {
+    /// Marks the stretches of time that stand out of what the commonest candidates leave.
+    pub(crate) fn look_for_pushes(&mut self) -> Result<(), EffectError> {
+        let n = self.model.dof();
+        let nominal: Vec<Vec<Vec<f64>>> = self
+            .signals
+            .par_iter()
+            .map(|s| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, &self.still, 0.0))
+            .collect();
+        let noise = noise_floor(&self.signals, &self.band, &nominal, n);
+        let bare = rows::at_rows(&self.band, &nominal, n);
+        let mut pushed =
+            contact::stretches(&self.signals, &self.band, &Left { noise: contact::noise(&bare), rest: bare });
+        if pushed.iter().all(Vec::is_empty) {
+            let (left, _) = self.left_beside_pushes(&noise);
+            pushed = contact::stretches(&self.signals, &self.band, &left);
+        }
+        // What pushes and what the robot itself lacks are told apart by turns: both stand out of a nominal model.
+        for look in 0..=LOOKS {
+            let none = pushed.iter().all(Vec::is_empty);
+            let as_before = self.signals.iter().map(|s| &s.pushed).eq(&pushed);
+            self.signals.iter_mut().zip(pushed).for_each(|(s, pushed)| s.pushed = pushed);
+            if none || as_before || look == LOOKS {
+                break;
+            }
+            let (left, always) = self.left_beside_pushes(&noise);
+            pushed = contact::of_one_force(&self.signals, &self.band, &left, &always);
+        }
+        Ok(())
+    }
+
+    /// What the commonest candidates leave of the logs beside the pushes known so far, these left in it, and the torque of
+    /// the force that these show if it were always there.
+    fn left_beside_pushes(&self, noise: &[f64]) -> (Left, Rows) {
+        let kinds: Vec<Kind> =
+            Kind::ALL.into_iter().filter(|kind| kind.card().common || kind.card().of_its_log).collect();
+        let mut candidates = Candidate::all(self.model);
+        candidates.retain(|c| c.kind.card().common);
+        if self.signals.iter().any(|s| !s.pushed.is_empty()) {
+            candidates.extend(Candidate::contacts(self.model));
+        }
+        let terms = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
+        let problem = self.data(noise).problem(terms, &kinds);
+        let theta = problem.robust();
+        let n = self.model.dof();
+        let pushes = |e: &&Entry| e.candidate.kind.card().of_its_log;
+        let holds_still = |e: &&Entry| e.candidate.kind.card().force == Some(Force::Dry);
+        let mut holds = vec![0.0; n];
+        for e in problem.entries.iter().filter(holds_still) {
+            e.candidate.joints.iter().for_each(|&j| holds[j] += theta[e.columns.start].abs());
+        }
+        let torque = |s: &Signals, keep: &dyn Fn(&&Entry) -> bool| {
+            let motion = Motion { pushed: &[[f64::NEG_INFINITY, f64::INFINITY]], ..s.motion(self.model, &self.still) };
+            let mut torque = vec![vec![0.0; s.len()]; n];
+            for e in problem.entries.iter().filter(keep) {
+                for (column, theta) in e.candidate.columns(&motion).iter().zip(&theta[e.columns.clone()]) {
+                    for (j, row) in &column.rows {
+                        torque[*j].iter_mut().zip(row).for_each(|(torque, x)| *torque += theta * x);
+                    }
+                }
+            }
+            torque
+        };
+        let rest = |s: &Signals| -> Vec<Vec<f64>> {
+            let own = torque(s, &|e| !pushes(e));
+            let left =
+                |j: usize| s.tau[j].iter().zip(&s.nominal[j]).zip(&own[j]).map(|((t, n), o)| t - n - o).collect();
+            (0..n).map(left).collect()
+        };
+        let still = |s: &Signals| -> Vec<Vec<f64>> {
+            let rests = |j: usize| s.v[j].iter().map(|v| f64::from(u8::from(v.abs() < self.still[j]))).collect();
+            (0..n).map(rests).collect()
+        };
+        let at_rows = |of: &dyn Fn(&Signals) -> Vec<Vec<f64>>| {
+            rows::at_rows(&self.band, &self.signals.iter().map(of).collect::<Vec<_>>(), n)
+        };
+        let (rest, still) = (at_rows(&rest), at_rows(&still));
+        let always = at_rows(&|s| torque(s, &pushes));
+        (Left::new(rest, &still, &holds), always)
+    }
+}

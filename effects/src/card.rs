@@ -38,8 +38,6 @@ pub struct Card {
     pub reads_torque: bool,
     /// Whether it changes the effort before it acts. It is told by the torque that the motion takes.
     pub on_effort: bool,
-    /// How it passes a signal on late: samples, its knob in s, and s from one sample to the next. `None` where it is not late.
-    pub passes: Option<fn(&[f64], f64, f64) -> Vec<f64>>,
     /// How its motor turns on its own.
     pub turning: Option<Turning>,
     /// Whether it is the inertia of a motor, which then turns on its own.
@@ -254,7 +252,6 @@ impl Card {
         bends: false,
         reads_torque: false,
         on_effort: false,
-        passes: None,
         turning: None,
         rotor: false,
         body: false,
@@ -275,7 +272,7 @@ impl Card {
 
     /// Whether it says how late the effort acts.
     pub fn is_late(&self) -> bool {
-        self.passes.is_some()
+        self.force == Some(Force::Late)
     }
 
     /// Whether its knob is a choice, where it has one: it stays as it is.

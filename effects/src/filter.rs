@@ -50,16 +50,6 @@ pub(crate) fn first_order(x: &[f64], time_constant: f64, dt: f64) -> Vec<f64> {
     out
 }
 
-/// A signal `time` s later, on a line between two samples; what lies before the first sample is taken as the first.
-pub(crate) fn delayed(x: &[f64], time: f64, dt: f64) -> Vec<f64> {
-    let at = |k: usize| {
-        let place = (k as f64 - time / dt).max(0.0);
-        let before = place.floor() as usize;
-        x[before] + place.fract() * (x[(before + 1).min(k)] - x[before])
-    };
-    (0..x.len()).map(at).collect()
-}
-
 /// Second derivative by central differences; at the ends that of the neighbour.
 pub(crate) fn second_derivative(x: &[f64], dt: f64) -> Vec<f64> {
     differences(x, |before, now, after| (after - 2.0 * now + before) / (dt * dt))

@@ -4,7 +4,7 @@
 //! Source: Åström, Wittenmark, Computer-Controlled Systems (1997) (sampling a system with a time delay).
 
 use crate::card::{Card, Force, Gauge, LATE, LATE_EXACT_TO, LATE_SPREAD, Place, Size};
-use crate::filter::{delayed, early};
+use crate::filter::early;
 use crate::law::{Law, Listed, Signature, Value, check};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
 use gapscope_dynamics::Model;
@@ -49,7 +49,6 @@ impl Signature for ActuationDelay {
         exact_to_samples: LATE_EXACT_TO,
         reads_torque: true,
         on_effort: true,
-        passes: Some(delayed),
         weighs: true,
         ..Card::BLANK
     };

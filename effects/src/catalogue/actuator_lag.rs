@@ -4,7 +4,7 @@
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), chapter 5 (the drive's current loop).
 
 use crate::card::{Card, Force, Gauge, LATE, LATE_EXACT_TO, LATE_SPREAD, Place, Size};
-use crate::filter::{first_derivative, lagged};
+use crate::filter::first_derivative;
 use crate::law::{Law, Listed, Signature, Value, check};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
 use gapscope_dynamics::Model;
@@ -55,7 +55,6 @@ impl Signature for ActuatorLag {
         exact_to_samples: LATE_EXACT_TO,
         reads_torque: true,
         on_effort: true,
-        passes: Some(lagged),
         weighs: true,
         ..Card::BLANK
     };

@@ -3,7 +3,7 @@
 use gapscope_datasets::{Recipe, generate};
 use gapscope_diagnosis::schema::FoundEffect;
 use gapscope_dynamics::InertialSource;
-use gapscope_effects::{CoulombFriction, Effect, Payload};
+use gapscope_effects::{CoulombFriction, Effect, LinkInertiaError, Payload};
 use gapscope_tests::{diagnose, robot};
 
 /// The body found where the last link of an arm, whose inertials come from `source`, carries `mass`, kg, in its centre: on the
@@ -38,4 +38,32 @@ fn a_light_load_could_be_a_link_and_a_heavy_one_could_not() {
 fn beside_links_that_were_weighed_a_light_load_is_a_load() {
     let load = body_found(0.5, InertialSource::Weighed);
     assert_eq!((load.kind.as_str(), load.indistinguishable_from.len()), ("payload", 0), "{load:#?}");
+}
+
+/// On a used arm, whose links are all off by a little, a load of many times its link is told from them: the last link could
+/// take it over, had it not a mass of its own.
+#[test]
+fn a_load_of_many_times_its_link_is_none_of_the_link() {
+    let model = robot("arm6");
+    let scale = |x: &[f64]| -> Vec<f64> { x.iter().map(|x| 0.06 * x).collect() };
+    let link = |joint: &gapscope_dynamics::Joint| {
+        let body = &joint.inertia;
+        let six = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)].map(|(i, j)| body.inertia.col(j)[i]);
+        Effect::LinkInertiaError(LinkInertiaError {
+            joint: joint.name.clone(),
+            mass_delta: 0.06 * body.mass,
+            first_moment_delta: scale(&body.first_moment.to_array()).try_into().unwrap(),
+            inertia_delta: scale(&six).try_into().unwrap(),
+        })
+    };
+    let last = model.joints().last().unwrap();
+    let mass = 15.0 * last.inertia.mass;
+    let com = [0.02, 0.01, 0.15];
+    let load = Payload { joint: last.name.clone(), mass, com, inertia: [1e-3, 0.0, 1e-3, 0.0, 0.0, 1e-3] };
+    let mut effects: Vec<Effect> = model.joints().iter().map(link).collect();
+    effects.push(Effect::Payload(load));
+    let log = |seed| generate(&model, &effects, seed, &Recipe::default(), "log.csv").unwrap();
+    let found = diagnose(&model, &[log(1), log(2), log(3)]).diagnosis.effects;
+    let load = found.iter().find(|e| e.kind == "payload");
+    assert!(load.is_some_and(|load| load.confidence > 0.9), "{found:#?}");
 }

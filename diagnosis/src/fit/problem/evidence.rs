@@ -219,4 +219,20 @@ mod tests {
         assert_eq!(at(0.9 * OUTLIER), 0.0);
         assert!(at(2.0 * OUTLIER) < 0.0 && at(4.0 * OUTLIER) < at(2.0 * OUTLIER));
     }
+
+    #[test]
+    fn of_rows_that_do_not_feel_the_effort_an_account_knows_no_more_than_its_size() {
+        let (_, band, problem, fit) = crate::fit::support::fitted(gapscope_effects::Kind::CoulombFriction, |_| {});
+        let sum = |open: &dyn Fn(usize) -> bool| {
+            let open: Vec<bool> = (0..band.rows.len()).map(open).collect();
+            let unpredicted = [open, vec![false; band.rows.len()]];
+            problem.evidence(&fit, None, Some(&unpredicted), &band).seen.iter().sum::<f64>()
+        };
+        let (none, some, all) = (sum(&|_| false), sum(&|row| row % 4 == 0), sum(&|_| true));
+        let plain: f64 = problem.evidence(&fit, None, None, &band).seen.iter().sum();
+        assert!((none - plain).abs() < 1e-9 * plain.abs());
+        // The logs hold hardly any noise: every row that an account does not predict costs it nats.
+        let rows = problem.joints[0].rows.len() as f64;
+        assert!(some < none - 0.5 * rows && all < some - rows, "{none} {some} {all} of {rows} rows");
+    }
 }

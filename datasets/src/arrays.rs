@@ -4,9 +4,9 @@
 use crate::channel_names;
 use crate::episode::Channel;
 use crate::error::{LogError, LogErrorKind};
-use crate::formats::Request;
 use crate::joint_names::UNNAMED;
 use crate::recording::Recording;
+use crate::request::Request;
 
 /// Most numbers that one array may hold: a day at 1 kHz of one quantity of 20 joints is 1.7e9, an hour 7.2e7.
 pub(crate) const MOST_NUMBERS: u64 = 1 << 28;

@@ -1,5 +1,6 @@
 //! Logs held against themselves and against the robot's model.
 
+mod dynamics;
 mod effort;
 mod order;
 mod position;
@@ -8,7 +9,7 @@ mod signal;
 mod units;
 mod velocity;
 
-pub(crate) use effort::{Fit, fit};
+pub(crate) use dynamics::{Fit, fit};
 pub(crate) use position::excess;
 pub(crate) use signal::Traits;
 pub(crate) use velocity::Relation;
@@ -89,6 +90,11 @@ impl<'a> Logs<'a> {
     /// Unit of a joint's position.
     pub(crate) fn unit(&self, joint: usize) -> &'static str {
         if self.is_prismatic(joint) { "m" } else { "rad" }
+    }
+
+    /// Factor from SI to the unit that logs carry by mistake.
+    pub(crate) fn other_unit(&self, joint: usize) -> (f64, &'static str) {
+        if self.is_prismatic(joint) { (1000.0, "mm") } else { (180.0 / std::f64::consts::PI, "degrees") }
     }
 
     pub(crate) fn is_prismatic(&self, joint: usize) -> bool {

@@ -4,9 +4,9 @@ use crate::arrays::{self, Array};
 use crate::bound::Keeper;
 use crate::episode::Episode;
 use crate::error::{LogError, LogErrorKind};
-use crate::formats::Request;
 use crate::options::ReadOptions;
 use crate::read::merged;
+use crate::request::Request;
 use crate::time_stamps;
 use gapscope_dynamics::Finding;
 

@@ -32,6 +32,7 @@ mod range;
 mod read;
 mod recording;
 mod reference;
+mod request;
 mod resample;
 mod robust;
 mod ros;

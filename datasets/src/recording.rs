@@ -3,9 +3,9 @@
 use crate::channel_names;
 use crate::episode::Channel;
 use crate::error::{LogError, LogErrorKind};
-use crate::formats::Request;
 use crate::header::plan;
 use crate::joint_names;
+use crate::request::Request;
 use crate::table::Table;
 use std::collections::BTreeMap;
 

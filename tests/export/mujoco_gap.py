@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 # Half-width of the kernel that forms derivatives, s; -3 dB frequency times half-width; cut-off of the comparison, Hz:
-# diagnosis/src/signals.rs, kernel.rs and band.rs.
+# diagnosis/src: record/signals.rs, numbers/kernel.rs and record/band.rs.
 HALF_WIDTH, CUTOFF_TIMES_HALF_WIDTH, CUTOFF = 0.010, 0.4631655, 10.0
 # Time for which drives see the first effort before the log begins, s.
 BEFORE = 1.0
@@ -22,7 +22,7 @@ LEAD = 1.0
 
 
 class Kernel:
-    """cos^4 on samples every dt s, as diagnosis/src/kernel.rs has it."""
+    """cos^4 on samples every dt s, as diagnosis/src/numbers/kernel.rs has it."""
 
     def __init__(self, half_width, dt):
         w = max(half_width, 2.5 * dt)

@@ -1,7 +1,7 @@
 //! Joints in another order: whether the efforts fit the model clearly better when joints change places.
 
 use super::Logs;
-use super::effort::{Dynamics, fit};
+use super::dynamics::{Dynamics, fit};
 
 /// Windows at which orders are compared.
 const WINDOWS: usize = 250;

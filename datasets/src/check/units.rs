@@ -1,6 +1,6 @@
 //! Positions in degrees or millimetres.
 
-use super::effort::Dynamics;
+use super::dynamics::Dynamics;
 use super::position::excess;
 use super::velocity::near;
 use super::{Logs, Report};
@@ -8,11 +8,6 @@ use std::f64::consts::PI;
 
 /// A joint without limits that goes further than this from zero, rad, may be in degrees.
 const FAR: f64 = 4.0 * PI;
-
-/// Factor from SI to the unit that logs carry by mistake.
-pub(super) fn other_unit(logs: &Logs, joint: usize) -> (f64, &'static str) {
-    if logs.is_prismatic(joint) { (1000.0, "mm") } else { (180.0 / PI, "degrees") }
-}
 
 /// Positions in degrees (millimetres). Returns the factor to the SI unit for each joint, where some are.
 ///
@@ -56,7 +51,7 @@ pub(super) fn check(logs: &Logs, report: &mut Report) -> Option<Vec<f64>> {
 
 /// Whether the measured velocity of a joint is a 57th (a thousandth) of the derivative of its position.
 fn is_slow(logs: &Logs, joint: usize) -> bool {
-    let (factor, _) = other_unit(logs, joint);
+    let (factor, _) = logs.other_unit(joint);
     let clear = |relation: &super::velocity::Relation| relation.correlation > 0.9;
     let mut slopes =
         logs.relations.iter().filter_map(|row| row[joint]).filter(clear).map(|relation| relation.slope).peekable();
@@ -73,7 +68,7 @@ struct Place {
 }
 
 fn place(logs: &Logs, joint: usize) -> Place {
-    let (factor, _) = other_unit(logs, joint);
+    let (factor, _) = logs.other_unit(joint);
     let low = logs.traits.iter().map(|traits| traits[joint].low).fold(f64::INFINITY, f64::min);
     let high = logs.traits.iter().map(|traits| traits[joint].high).fold(f64::NEG_INFINITY, f64::max);
     let limits = &logs.model.joints()[joint].limits;
@@ -89,13 +84,13 @@ fn place(logs: &Logs, joint: usize) -> Place {
 }
 
 fn scale(logs: &Logs, joints: &[bool]) -> Vec<f64> {
-    (0..joints.len()).map(|j| if joints[j] { 1.0 / other_unit(logs, j).0 } else { 1.0 }).collect()
+    (0..joints.len()).map(|j| if joints[j] { 1.0 / logs.other_unit(j).0 } else { 1.0 }).collect()
 }
 
 fn say(logs: &Logs, joints: &[bool], reason: &str, report: &mut Report) {
     let joints: Vec<usize> = (0..joints.len()).filter(|&joint| joints[joint]).collect();
     let Some(&first) = joints.first() else { return };
-    let (factor, unit) = other_unit(logs, first);
+    let (factor, unit) = logs.other_unit(first);
     let si = logs.unit(first);
     let scale = 1.0 / factor;
     report.add_joints(

@@ -1,7 +1,6 @@
 //! Measured velocity against the derivative of measured position.
 
 use super::signal::{self, prediction_errors, raster, trimmed_rms};
-use super::units::other_unit;
 use super::{Case, Logs, Report};
 use crate::robust::rms;
 
@@ -120,7 +119,7 @@ pub(super) fn check(logs: &Logs, report: &mut Report) {
                 continue;
             }
             let Some(relation) = relation else { continue };
-            let (factor, _) = other_unit(logs, j);
+            let (factor, _) = logs.other_unit(j);
             if relation.correlation.abs() < 0.9 {
                 strange.push((case(relation.correlation), other_joint(logs, e, j)));
             } else if near(relation.slope, factor, 0.05) {
@@ -139,7 +138,7 @@ pub(super) fn check(logs: &Logs, report: &mut Report) {
         }
     }
     report.add(&constant, |value| format!("the velocity is {value} throughout, though the joint moves: leave the velocity columns out, and it is derived from the position"));
-    let unit_names = |cases: &[Case]| cases.first().map_or("degrees", |case| other_unit(logs, case.joint).1);
+    let unit_names = |cases: &[Case]| cases.first().map_or("degrees", |case| logs.other_unit(case.joint).1);
     let names = unit_names(&unit);
     report.add(&unit, |value| format!("the velocity is {value} times the derivative of the position: it is in {names} per second, not SI; scale it in the column map, or leave it out"));
     report.add(&opposite, |_| "the velocity has the opposite sign to the derivative of the position: its sign is turned, or the position's; negate one of them (scale = -1 in the column map), whichever does not follow the URDF's axis".to_owned());

@@ -5,6 +5,7 @@ mod excitation;
 mod fourier;
 mod limits;
 mod point_to_point;
+mod sampled;
 mod sweep;
 
 pub use excitation::{Excitation, excitation};

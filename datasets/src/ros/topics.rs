@@ -5,9 +5,9 @@ use super::group::Group;
 use super::joints::{Messages, TYPES};
 use crate::episode::Channel;
 use crate::error::{LogError, LogErrorKind};
-use crate::formats::Request;
 use crate::joint_names;
 use crate::recording::Recording;
+use crate::request::Request;
 use std::collections::BTreeMap;
 
 /// The topics of a bag.

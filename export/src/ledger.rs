@@ -34,7 +34,7 @@ pub struct TargetLedger {
     pub shrink_here: Option<f64>,
     /// The effects.
     pub effects: Vec<Entry>,
-    /// Lines to paste into a file of the user's own, where the target has such: joint, then the element.
+    /// Lines to paste into a file of the user's own, where the target has such: joint, then its element (URDF) or attributes (MJCF).
     pub paste: Vec<String>,
     /// What else the target lacks or does otherwise.
     pub notes: Vec<String>,

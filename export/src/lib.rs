@@ -11,6 +11,7 @@ mod isaaclab;
 mod ledger;
 mod mjcf;
 mod number;
+mod paste;
 mod ranges;
 mod totals;
 mod urdf;
@@ -149,7 +150,11 @@ pub fn export(target: Target, robot: &Robot, corrected: &Corrected, logs: &[Epis
     let mut ledger = predict(robot, corrected, logs, &carried)?;
     ledger.target = target.name().to_owned();
     ledger.file = target.file().to_owned();
-    ledger.paste = if target == Target::Urdf { urdf::paste(model, &totals) } else { Vec::new() };
+    ledger.paste = match target {
+        Target::Urdf => paste::urdf(model, &totals),
+        Target::Mjcf => paste::mjcf(model, &totals),
+        Target::IsaacLab | Target::C => Vec::new(),
+    };
     ledger.notes = notes(target, robot.dt, corrected, &totals);
     ledger.notes.extend(emptied.iter().map(|link| {
         format!(

@@ -10,7 +10,7 @@ use crate::number::{number, roll_pitch_yaw, vector};
 use crate::totals::Totals;
 use crate::{ExportError, Robot};
 use edit::Edits;
-use gapscope_dynamics::{GRAVITY, Inertia, Joint, JointKind, LinkFrame, Model, Placement};
+use gapscope_dynamics::{GRAVITY, Inertia, JointKind, LinkFrame, Placement};
 use glam::{DMat3, DQuat, DVec3};
 use inertial::{child, origin};
 use roxmltree::{Document, Node};
@@ -65,17 +65,6 @@ pub fn write(robot: &Robot, totals: &Totals) -> Result<(String, Vec<String>), Ex
         tilt(&mut edits, root, robot, totals.model.gravity());
     }
     Ok((edits.apply(), emptied))
-}
-
-/// Joints whose friction changes, each with its element to paste, to four digits.
-pub fn paste(nominal: &Model, totals: &Totals) -> Vec<String> {
-    let line = |(j, joint): (usize, &Joint)| {
-        let (damping, friction) = (totals.damping[j], totals.friction[j]);
-        let changed = damping != joint.damping || friction != joint.friction;
-        let [damping, friction] = [damping, friction].map(|x| number(format!("{x:.3e}").parse().unwrap_or(x)));
-        changed.then(|| format!("{}: <dynamics damping=\"{damping}\" friction=\"{friction}\"/>", joint.name))
-    };
-    nominal.joints().iter().enumerate().filter_map(line).collect()
 }
 
 /// The link or joint of a name.

@@ -104,6 +104,9 @@ pub enum Study {
 
 /// Arguments of the studies of logs of real machines.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope study real-logs --data logs --force
+  gapscope study agreement --data logs --force")]
 pub struct RealLogs {
     /// Folder of the logs, a folder each: emps, tx40, kinova_gen3, double_pendulum, kuka_lwr4
     #[arg(long, value_name = "DIR")]
@@ -118,6 +121,8 @@ pub struct RealLogs {
 
 /// Arguments of `study closed-loop`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope study closed-loop --out docs --force")]
 pub struct ClosedLoop {
     /// Folder for closed-loop.md and closed-loop.svg [default: a new folder in the current one]
     #[arg(long, value_name = "DIR")]
@@ -132,6 +137,9 @@ pub struct ClosedLoop {
 
 /// Arguments of the studies of learning.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope study samples --force
+  gapscope study region --steps 2000 --repeats 1 --out quick")]
 pub struct Learning {
     /// Folder for the table, its CSV and its picture
     #[arg(long, default_value = "docs/studies", value_name = "DIR")]
@@ -149,6 +157,10 @@ pub struct Learning {
 
 /// Arguments of `withheld make`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope withheld make bank                                     one case of each kind
+  gapscope withheld make bank2 --cases 40 --none 10 --robots arm7,arm6 --seed 2
+  gapscope withheld make worn --used --robots arm7,arm6           used arms")]
 pub struct MakeBank {
     /// Folder for the cases; what is sealed goes into a folder beside it, `.sealed` behind its name
     pub out: PathBuf,
@@ -221,6 +233,8 @@ pub struct Trials {
 
 /// Arguments of `withheld calibrate`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope withheld calibrate bank --answers kept")]
 pub struct CalibrateBank {
     /// Folders of cases; what is sealed lies in a folder beside each, `.sealed` behind its name
     #[arg(required = true, value_name = "BANK")]
@@ -238,6 +252,9 @@ pub struct CalibrateBank {
 
 /// Arguments of `withheld score`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope withheld score bank --out scores
+  gapscope withheld score bank bank2 --jobs 2 --keep kept")]
 pub struct ScoreBank {
     /// Folders of cases, counted apart and together; what is sealed lies in a folder beside each, `.sealed` behind its name
     #[arg(required = true, value_name = "BANK")]
@@ -261,4 +278,38 @@ pub struct ScoreBank {
 
 fn at_least_one(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above zero".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// Commands below a command that do something themselves.
+    fn leaves(command: &clap::Command, found: &mut Vec<clap::Command>) {
+        let inner: Vec<_> = command.get_subcommands().filter(|inner| inner.get_name() != "help").collect();
+        if inner.is_empty() {
+            found.push(command.clone());
+        }
+        inner.into_iter().for_each(|inner| leaves(inner, found));
+    }
+
+    #[test]
+    fn the_help_of_every_command_has_examples_that_parse() {
+        let mut all = vec![Cli::command()];
+        leaves(&Cli::command(), &mut all);
+        assert!(all.len() > 20, "{}", all.len());
+        for command in all {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            let examples: Vec<&str> =
+                help.lines().map(str::trim).filter(|line| line.starts_with("gapscope ")).collect();
+            assert!(!examples.is_empty(), "{} has no example", command.get_name());
+            for line in examples {
+                // What an example is for stands behind two spaces, what the shell does with it behind a pipe or an arrow.
+                let call = line.split("  ").next().unwrap_or_default().split(['|', '>']).next().unwrap_or_default();
+                let parsed = Cli::try_parse_from(call.split_whitespace());
+                assert!(parsed.is_ok(), "{line}: {}", parsed.err().map(|e| e.to_string()).unwrap_or_default());
+            }
+        }
+    }
 }

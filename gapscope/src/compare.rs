@@ -20,6 +20,9 @@ const FALSE_ALARM: f64 = 0.05;
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope compare monday.gapscope friday.gapscope                  which parameters drifted
+  gapscope compare left.gapscope right.gapscope --picture arms.svg")]
 pub struct Compare {
     /// Folders that `diagnose` wrote, or the diagnosis.json or corrected.json in them; the first is what others are held against
     #[arg(required = true, num_args = 2.., value_name = "RESULTS")]

@@ -23,6 +23,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope demo                  another effect each time
+  gapscope demo --seed 0         the one of the README")]
 pub struct Demo {
     /// Which effect is withheld is drawn from this number [default: the time of day]
     #[arg(long)]

@@ -2,6 +2,7 @@
 
 use crate::cli::Input;
 use crate::input::{Loaded, load_any};
+use crate::progress::Progress;
 use crate::report::terminal::Paint;
 use crate::report::{Beside, Setting};
 use crate::trust::trusting;
@@ -11,7 +12,6 @@ use clap::Args;
 use gapscope_datasets::{Bound, Trajectory};
 use gapscope_diagnosis::schema::Evidence;
 use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, Progress as Told, diagnose};
-use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
 use std::path::PathBuf;
 
@@ -135,7 +135,7 @@ impl Found {
             Found::Torque(outcome, _) => {
                 summary::summary(&outcome.diagnosis, out.map(|out| out.join("report.html")).as_deref(), paint)
             }
-            Found::Servo(outcome, _) => servo::summary(&outcome.diagnosis, out, paint),
+            Found::Servo(outcome, beside) => servo::summary(&outcome.diagnosis, beside, out, paint),
         }
     }
 
@@ -231,27 +231,4 @@ fn files(outcome: &Outcome, setting: &Setting, out: &Path) -> Result<Vec<(&'stat
         // The advice of an earlier diagnosis in this folder is out of date.
         (NEXT_EXPERIMENT, motion),
     ])
-}
-
-/// A bar on standard error where that is a terminal, nothing elsewhere.
-struct Progress(ProgressBar);
-
-impl Progress {
-    fn new(quiet: bool) -> Progress {
-        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(100) };
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  about {eta} left  {msg}") {
-            bar.set_style(style);
-        }
-        Progress(bar)
-    }
-
-    /// Never goes back: a stage that is entered again, where the search takes turns, leaves the bar where it is.
-    fn stage(&self, stage: &str, part: f64) {
-        self.0.set_position(self.0.position().max((100.0 * part) as u64));
-        self.0.set_message(stage.to_owned());
-    }
-
-    fn finish(&self) {
-        self.0.finish_and_clear();
-    }
 }

@@ -254,7 +254,8 @@ fn table(target: &TargetLedger, file: &str) -> String {
         },
     }
     if !target.paste.is_empty() {
-        text += "To paste into a URDF of your own:\n";
+        let a_file = if target.target == "mjcf" { "the <joint>s of an MJCF" } else { "a URDF" };
+        let _ = writeln!(text, "To paste into {a_file} of your own:");
     }
     for line in &target.paste {
         let _ = writeln!(text, "  {line}");

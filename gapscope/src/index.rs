@@ -132,6 +132,21 @@ mod tests {
     }
 
     #[test]
+    fn two_hundred_diagnoses_make_one_small_page() {
+        let dir = tempfile::tempdir().unwrap();
+        let texts: Vec<String> =
+            sample::all().iter().map(|(_, diagnosis, _)| serde_json::to_string(diagnosis).unwrap()).collect();
+        for i in 0..200 {
+            output::write(&dir.path().join(format!("run_{i:03}")).join(DIAGNOSIS), &texts[i % texts.len()]).unwrap();
+        }
+        let told = run(&args(dir.path())).unwrap();
+        let page = dir.path().join("index.html");
+        let bytes = std::fs::metadata(&page).unwrap().len();
+        assert!(told.starts_with("200 of 200 diagnoses") && bytes < 600_000, "{told}, {bytes} bytes");
+        crate::report::look(&[&page], &["--index"]);
+    }
+
+    #[test]
     fn a_folder_without_a_diagnosis_is_told() {
         let dir = tempfile::tempdir().unwrap();
         assert!(run(&args(dir.path())).unwrap_err().to_string().contains("gapscope diagnose"));

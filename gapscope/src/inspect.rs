@@ -18,6 +18,10 @@ use std::path::PathBuf;
 
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope inspect run1.csv                                    rate, gaps, jitter and motion
+  gapscope inspect run1.csv --model robot.urdf                 also faults, and what the log determines
+  gapscope inspect run1.csv --model robot.urdf --suggest-map columns.toml")]
 pub struct Inspect {
     /// Logs, as `diagnose` reads them
     #[arg(required = true)]

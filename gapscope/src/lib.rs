@@ -15,6 +15,7 @@ pub mod inspect;
 pub mod learned;
 mod output;
 mod picture;
+mod progress;
 mod report;
 mod residuals;
 pub mod robot;

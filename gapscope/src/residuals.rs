@@ -17,6 +17,9 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `residuals`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope residuals robot.urdf run1.csv --with run1.gapscope/corrected.json
+  gapscope residuals robot.urdf run1.csv --with run1.gapscope/corrected.json --to csv,mcap")]
 pub struct Residuals {
     /// Robot and logs
     #[command(flatten)]

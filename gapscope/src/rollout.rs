@@ -17,6 +17,10 @@ use std::time::Duration;
 
 /// Arguments of `rollout`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope rollout robot.urdf run1.csv
+  gapscope rollout robot.urdf run1.csv --with run1.gapscope/corrected.json --horizon 2
+  gapscope rollout robot.urdf run1.csv --with run1.gapscope/corrected.json --residual residual.trained")]
 pub struct Rollout {
     /// Robot and logs
     #[command(flatten)]

@@ -2,20 +2,19 @@
 //! sentences, what it cannot be told from, then the figures.
 
 mod change;
+pub mod which;
 
 use crate::input::fault_line;
-use crate::report::plain::{self, combination, together};
-use crate::report::terminal::{INDENT, Paint, block, blocks, clean, column, fill, pad, wrap};
+use crate::report::plain;
+use crate::report::terminal::{INDENT, Paint, block, blocks, clean, column, fill, name as padded, pad, wrap};
 use crate::report::{
-    NONE, capital, changed, count, effect, effects, estimate, figure, headline, implied_unit, interval, is_above_floor,
-    joint_list, largest, motion_unit, outstanding, percent, percent_figure, plain as rounded, power_line,
-    probability_figure, regime, said_of, significant, span, verdict, with_unit, words_of_the_rest,
+    capital, changed, count, effect, effects, figure, headline, implied_unit, in_words, interval, is_above_floor,
+    largest, list, motion_unit, outstanding, percent, percent_figure, plain as rounded, power_line, regime,
+    significant, verdict, with_unit, words_of_the_rest,
 };
 use change::Cells;
-use gapscope_diagnosis::schema::{
-    Diagnosis, Estimate, Evaluation, FoundEffect, Parameter, Regime, Shrink, Verdict, Why,
-};
-use std::collections::BTreeMap;
+use gapscope_datasets::{Doubt, Fault};
+use gapscope_diagnosis::schema::{Diagnosis, Evaluation, FoundEffect, Regime, Shrink, Verdict, Why};
 use std::path::Path;
 
 /// Effects, regimes, rollouts and findings shown; the rest is counted.
@@ -29,25 +28,26 @@ const LOST: f64 = 1e3;
 
 /// The three sentences of the answer, and nothing else.
 pub fn answer(diagnosis: &Diagnosis, paint: &Paint) -> String {
-    ordinary_spaces(&told(diagnosis, paint))
+    ordinary_spaces(&told(&plain::answer(diagnosis), diagnosis.verdict, paint))
 }
 
-fn told(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
+/// Sentences within the width, the first in the colour of the verdict.
+pub fn told(sentences: &[String], verdict: Verdict, paint: &Paint) -> Vec<String> {
     let mut lines = vec![];
-    for (i, line) in plain::answer(diagnosis).iter().enumerate() {
+    for (i, line) in sentences.iter().enumerate() {
         let wrapped = wrap(&clean(line), paint.width);
-        lines.extend(wrapped.into_iter().map(|l| if i == 0 { paint.verdict(&l, diagnosis.verdict) } else { l }));
+        lines.extend(wrapped.into_iter().map(|l| if i == 0 { paint.verdict(&l, verdict) } else { l }));
     }
     lines
 }
 
 /// What is wrong with the data, and what may be.
-fn faults(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
-    let (data, mut lines) = (&diagnosis.data, Vec::new());
-    for fault in &data.faults {
+pub fn faults(faults: &[Fault], doubts: &[Doubt], paint: &Paint) -> Vec<String> {
+    let mut lines = Vec::new();
+    for fault in faults {
         block(&mut lines, paint, "Fault", &[clean(&fault_line(fault))]);
     }
-    for doubt in &data.doubts {
+    for doubt in doubts {
         block(&mut lines, paint, "In doubt", &[clean(&capital(&doubt.question))]);
     }
     if !lines.is_empty() {
@@ -60,8 +60,8 @@ fn faults(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
 pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> String {
     let data = &diagnosis.data;
     // An answer of wrong logs is none: what is wrong with them comes before it.
-    let mut lines = faults(diagnosis, paint);
-    lines.extend(told(diagnosis, paint));
+    let mut lines = faults(&data.faults, &data.doubts, paint);
+    lines.extend(told(&plain::answer(diagnosis), diagnosis.verdict, paint));
     lines.push(String::new());
     let of = format!(
         "{} · {}, {}, {} at {}",
@@ -72,7 +72,7 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
         with_unit(&rounded(data.rate), "Hz")
     );
     lines.extend(wrap(&clean(&of), paint.width));
-    block(&mut lines, paint, "Ties", &ties(diagnosis));
+    block(&mut lines, paint, "Ties", &ties(&diagnosis.effects));
     let label = verdict(diagnosis.verdict).to_uppercase();
     let mended = data.faults.iter().any(|fault| fault.mended);
     let of = if mended { "Of the mended logs: " } else { "" };
@@ -80,7 +80,7 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
     lines.extend(wrap(&head, paint.width));
     lines.push(String::new());
     if diagnosis.verdict != Verdict::NotExcited {
-        block(&mut lines, paint, "Which", &which(diagnosis, paint));
+        block(&mut lines, paint, "Which", &which::of(diagnosis, paint));
         block(&mut lines, paint, "Where", &places(diagnosis));
         block(
             &mut lines,
@@ -94,7 +94,7 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
         block(&mut lines, paint, "Power", &[line]);
     }
     if let Some(next) = &diagnosis.next_experiment {
-        block(&mut lines, paint, "Next", &[clean(&next.motion)]);
+        block(&mut lines, paint, "Next", &[clean(&in_words(&next.motion))]);
     }
     let mut text = ordinary_spaces(&lines);
     if let Some(out) = out {
@@ -104,13 +104,16 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
 }
 
 /// What the logs cannot tell apart, a line each.
-fn ties(diagnosis: &Diagnosis) -> Vec<String> {
-    let tied = diagnosis.effects.iter().filter(|found| !found.indistinguishable_from.is_empty());
-    tied.map(|found| {
+pub fn ties(found: &[FoundEffect]) -> Vec<String> {
+    let tied = found.iter().filter(|found| !found.indistinguishable_from.is_empty());
+    let tie = |found: &FoundEffect| {
         let kinds = effects(&found.indistinguishable_from);
-        clean(&format!("{} could also be {}", effect(&found.kind), kinds.join(" or ")))
-    })
-    .collect()
+        clean(&format!("{} could also be {}", effect(&found.kind), list(&kinds, "or")))
+    };
+    let mut lines: Vec<String> = tied.map(tie).collect();
+    lines.sort();
+    lines.dedup();
+    lines
 }
 
 /// What was proposed, against what, and by how much the logs spoke for it or against it: one line a comparison.
@@ -150,7 +153,7 @@ pub fn evaluation_summary(evaluation: &Evaluation) -> String {
             let floor =
                 torque.floor.get(*joint).map_or(String::new(), |f| format!("; noise floor {}", significant(*f, 2)));
             let rms_text = with_unit(&figure(*rms), unit);
-            format!("{}  {}  torque gap {} rms{floor}", pad(joint, width), blocks(rms / top, 10), fill(&rms_text, 9))
+            format!("{}  {}  torque gap {} rms{floor}", padded(joint, width), blocks(rms / top, 10), fill(&rms_text, 9))
         })
         .collect();
     block(&mut lines, paint, "Where", &rest(rows, joints.len(), LOGS, "joint"));
@@ -167,7 +170,7 @@ pub fn evaluation_summary(evaluation: &Evaluation) -> String {
                     worst.map_or("–".into(), |(joint, rms)| format!("largest at {joint}: {} rms", figure(*rms)))
                 }
             };
-            format!("{}  {text}", pad(&log.log, width))
+            format!("{}  {text}", padded(&log.log, width))
         })
         .collect();
     block(&mut lines, paint, "Logs", &rest(rows, evaluation.logs.len(), LOGS, "log"));
@@ -178,93 +181,6 @@ pub fn evaluation_summary(evaluation: &Evaluation) -> String {
 pub fn ordinary_spaces(lines: &[String]) -> String {
     let text: String = lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect();
     text.replace(['\u{a0}', '\u{202f}'], " ")
-}
-
-fn which(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
-    if diagnosis.effects.is_empty() {
-        let text = match diagnosis.verdict {
-            Verdict::NoGap => "none needed",
-            _ => "nothing I know: no effect of the catalogue explains this gap",
-        };
-        return vec![text.into()];
-    }
-    let effects = together(diagnosis);
-    let shown = &effects[..effects.len().min(EFFECTS)];
-    let name = |e: &FoundEffect| capital(&effect(&e.kind));
-    let place = |e: &FoundEffect| joint_list(&e.joints, &diagnosis.joints);
-    let names: Vec<String> = shown.iter().map(name).collect();
-    let places: Vec<String> = shown.iter().map(place).collect();
-    let (first, second) = (column(names.iter().map(String::as_str), 28), column(places.iter().map(String::as_str), 34));
-    let mut rows = vec![];
-    for ((found, name), place) in shown.iter().zip(&names).zip(&places) {
-        let alone = match found.shrink.torque {
-            Some(s) if s < 0.0 => format!(", alone grows the gap by {}", percent(-s)),
-            Some(s) => format!(", alone shrinks the gap by {}", percent(s)),
-            None => String::new(),
-        };
-        let line = format!("{}  {:>4} % sure{alone}", pad(place, second), probability_figure(found.confidence));
-        let name = paint.bold(&pad(name, first));
-        // Of a link alone, logs tell little.
-        if of_links(diagnosis, &found.kind) {
-            rows.push(format!("{name}  {line}"));
-            let sums = diagnosis.combinations.iter().filter(|sum| sum.differs()).take(SUMS);
-            rows.extend(sums.map(|sum| format!("  {}", clean(&combination(sum)))));
-            continue;
-        }
-        let details: Vec<String> =
-            found.parameters.iter().filter_map(|(name, p)| value(&found.kind, name, p)).collect();
-        let details = details.join("; ");
-        let columns = INDENT + first + 4 + line.chars().count();
-        if columns + details.chars().count() <= paint.width {
-            rows.push(format!("{name}  {line}  {details}"));
-        } else {
-            rows.push(format!("{name}  {line}"));
-            rows.push(format!("  {details}"));
-        }
-    }
-    rest(rows, effects.len(), EFFECTS, "effect")
-}
-
-/// Whether a kind says how links differ from the URDF.
-fn of_links(diagnosis: &Diagnosis, kind: &str) -> bool {
-    diagnosis.effects.iter().any(|effect| effect.kind == kind && effect.parameters.contains_key("mass_delta"))
-}
-
-/// `static friction 0.42–1.51 N m, each ± 0.04 or less`; vectors are left to the report.
-fn value(kind: &str, name: &str, found: &Parameter) -> Option<String> {
-    let text = match found {
-        Parameter::Single(single) => one(single)?,
-        Parameter::PerJoint(map) if map.len() == 1 => one(map.values().next()?)?,
-        Parameter::PerJoint(map) => format!("{}{}", span(map.values())?, widest(map)),
-    };
-    Some(said_of(kind, name, &text))
-}
-
-fn one(single: &Estimate) -> Option<String> {
-    let printed = estimate(single);
-    let [half] = printed.half_width.as_slice() else {
-        return None;
-    };
-    let text = match half.as_str() {
-        "0" | NONE => printed.value.clone(),
-        half => format!("{} ± {half}", printed.value),
-    };
-    Some(with_unit(&text, &printed.unit))
-}
-
-/// The widest half interval over the joints.
-fn widest(map: &BTreeMap<String, Estimate>) -> String {
-    let half = |e: &Estimate| match (&e.ci95[0], &e.ci95[1]) {
-        (gapscope_diagnosis::schema::Quantity::Scalar(a), gapscope_diagnosis::schema::Quantity::Scalar(b)) => {
-            (b - a) / 2.0
-        }
-        _ => f64::NAN,
-    };
-    let widest = map.values().filter(|e| half(e).is_finite()).max_by(|a, b| half(a).total_cmp(&half(b)));
-    widest.map(estimate).map_or(String::new(), |p| match p.half_width.as_slice() {
-        [half] => format!(", ± {half} or less"),
-        _ => String::new(),
-    })
 }
 
 fn places(diagnosis: &Diagnosis) -> Vec<String> {
@@ -280,10 +196,20 @@ fn places(diagnosis: &Diagnosis) -> Vec<String> {
     if diagnosis.verdict == Verdict::NoGap {
         return rows;
     }
+    let outstanding = regime_rows(&diagnosis.gap.regimes, &|joint| is_above_floor(diagnosis, joint));
+    if outstanding.is_empty() && !diagnosis.gap.regimes.is_empty() {
+        rows.push("spread over all regimes of the motion".into());
+    }
+    rows.extend(outstanding);
+    rows
+}
+
+/// The regimes that stand out, one a joint; of joints at the noise none.
+pub fn regime_rows(regimes: &[Regime], above: &dyn Fn(&str) -> bool) -> Vec<String> {
     let mut shown: Vec<&Regime> = vec![];
-    for found in outstanding(&diagnosis.gap.regimes) {
+    for found in outstanding(regimes) {
         let new = !shown.iter().any(|r| r.joint == found.joint);
-        if shown.len() < REGIMES && new && is_above_floor(diagnosis, &found.joint) {
+        if shown.len() < REGIMES && new && above(&found.joint) {
             shown.push(found);
         }
     }
@@ -292,21 +218,18 @@ fn places(diagnosis: &Diagnosis) -> Vec<String> {
     let name = |r: &&Regime| if r.regime == "frequency_band" { interval(&r.bounds) } else { regime(&r.regime) };
     let names: Vec<String> = shown.iter().map(name).collect();
     let name_width = column(names.iter().map(String::as_str), 17);
-    for (found, name) in shown.iter().zip(&names) {
-        rows.push(format!(
+    let row = |(found, name): (&&Regime, &String)| {
+        format!(
             "{}  {}  {} {:>4} % of squared gap, {} of {}",
-            pad(&found.joint, width),
-            pad(name, name_width),
+            padded(&found.joint, width),
+            padded(name, name_width),
             blocks(found.share, 8),
             percent_figure(found.share),
             percent(found.samples),
             if found.regime == "frequency_band" { "effort" } else { "samples" }
-        ));
-    }
-    if shown.is_empty() && !diagnosis.gap.regimes.is_empty() {
-        rows.push("spread over all regimes of the motion".into());
-    }
-    rows
+        )
+    };
+    shown.iter().zip(&names).map(row).collect()
 }
 
 fn how_far(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Vec<String> {
@@ -355,7 +278,10 @@ fn notes(diagnosis: &Diagnosis, terminal: bool) -> Vec<String> {
     if let Some(other) = best.filter(|a| a.probability >= 0.05) {
         let kinds: Vec<String> = other.effects.iter().map(|kind| effect(kind)).collect();
         let kinds = if kinds.is_empty() { "no effect at all".into() } else { kinds.join(" + ") };
-        rows.push(clean(&format!("or {kinds} ({})", percent(other.probability))));
+        rows.push(clean(&format!(
+            "instead of all these, with a probability of {}: {kinds}",
+            percent(other.probability)
+        )));
     }
     if matches!(diagnosis.verdict, Verdict::PartlyExplained | Verdict::UnknownEffect) {
         rows.push(clean(&words_of_the_rest(&diagnosis.unexplained, &diagnosis.joints)));
@@ -366,7 +292,7 @@ fn notes(diagnosis: &Diagnosis, terminal: bool) -> Vec<String> {
 }
 
 /// Appends a count of what is not shown.
-fn rest(mut rows: Vec<String>, all: usize, shown: usize, thing: &str) -> Vec<String> {
+pub fn rest(mut rows: Vec<String>, all: usize, shown: usize, thing: &str) -> Vec<String> {
     if all > shown {
         rows.push(format!("and {}", count(all - shown, &format!("more {thing}"))));
     }

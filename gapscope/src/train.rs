@@ -38,6 +38,10 @@ impl Kind {
 
 /// Arguments of `train`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope train residual robot.urdf run1.csv run2.csv                 a network on top of the physics
+  gapscope train residual robot.urdf run1.csv --with run1.gapscope/corrected.json
+  gapscope train pure robot.urdf run1.csv --out network                a network without physics")]
 pub struct Train {
     /// What to train
     #[arg(value_enum)]

@@ -1,7 +1,7 @@
 """Opens pages in headless Chromium, uses them as a person would, and says what is wrong.
 
     pip install playwright==1.56.0                 # the driver alone; the browser is the system's own Chromium
-    python tests/report/browser.py report.html...  [--index] [--shots FOLDER]
+    python tests/report/browser.py report.html...  [--index] [--shots FOLDER] [--within SECONDS]
 
 Each page is opened from its folder, without a network, at three sizes, light and dark. Checked: no error on the console,
 no request to anywhere, no sideways scrolling, text readable against what is behind it (WCAG AA). Of a report also: turning
@@ -58,6 +58,7 @@ def main():
     parser.add_argument("pages", nargs="+", type=pathlib.Path)
     parser.add_argument("--index", action="store_true")
     parser.add_argument("--shots", type=pathlib.Path)
+    parser.add_argument("--within", type=float, help="the longest that a page may take to open, s")
     args = parser.parse_args()
     patience = 120_000  # ms; a machine may be busy
     browser_file = next(filter(None, map(shutil.which, ["chromium", "chromium-browser", "google-chrome"])), None)
@@ -98,6 +99,9 @@ def check(browser, file, size, scheme, args):
     page.on("request", lambda r: faults.append(f"asks for {r.url}") if r.url != file.resolve().as_uri() else None)
     page.goto(file.resolve().as_uri())
     page.wait_for_timeout(150)
+    opened = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd") / 1e3
+    if args.within and opened > args.within:
+        faults.append(f"opens in {opened:.2f} s")
     wide = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
     if (beyond := page.evaluate(wide)) > 0:
         faults.append(f"scrolls sideways by {beyond} px")

@@ -6,6 +6,10 @@ use std::path::PathBuf;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope export run1.gapscope --robot robot.urdf --to urdf,mjcf
+  gapscope export run1.gapscope --robot robot.urdf --to mjcf --logs other.csv     also what is lost there
+  gapscope export run1.gapscope --robot robot.urdf --to c --dt 0.002")]
 pub struct Export {
     /// Folder that `diagnose` wrote, or the corrected.json in it
     pub results: PathBuf,

@@ -6,6 +6,11 @@ use std::path::PathBuf;
 
 /// Arguments of `generate`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope generate arm7 --perturb --out logs             a robot that is a little off everywhere
+  gapscope generate arm6 --effects rubbing.json --episodes 2 --seconds 20 --out logs
+  gapscope generate robot.urdf --effects truth.json --motion chirp --rate 1000 --out logs
+  gapscope diagnose logs/robot.urdf logs/episode_0.csv    what the logs tell of them")]
 pub struct Generate {
     /// Robot description (URDF), or a built-in robot: arm7, arm6, double_pendulum
     #[arg(default_value = "arm7")]

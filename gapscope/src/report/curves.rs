@@ -37,7 +37,10 @@ pub fn of(evidence: &Evidence, effects: &[FoundEffect]) -> Vec<EffectCurve> {
         }
         curve
     };
-    evidence.curves.iter().map(with_band).collect()
+    let mut curves: Vec<Curve> = evidence.curves.iter().map(with_band).collect();
+    // In the order of the table of effects.
+    curves.sort_by_key(|curve| effects.iter().position(|effect| effect.kind == curve.kind).unwrap_or(usize::MAX));
+    curves
 }
 
 /// Ends of a law's parameter as parts of its value, where the law is in proportion to that one.

@@ -47,8 +47,12 @@ fn row(effect: &FoundEffect, all: &[String], shrinks: &str) -> Markup {
                 td.joints data-label="joints" title=(effect.joints.join(", ")) { (words::joints(&effect.joints, all)) }
                 td.nowrap data-label="confidence" { (meter(effect.confidence)) " " (format::probability_figure(effect.confidence)) "\u{202f}%" }
                 td.number data-label=(shrinks) {
-                    (effect.shrink.torque.map_or(unknown.into(), percent))
-                    @if let Some(interval) = effect.shrink.ci95 { " " span.muted.nowrap { (percent_interval(interval)) } }
+                    @let grows = effect.shrink.torque.is_some_and(|part| part < 0.0);
+                    @if grows { "grows by " }
+                    (effect.shrink.torque.map_or(unknown.into(), |part| percent(part.abs())))
+                    @if let Some([low, high]) = effect.shrink.ci95 {
+                        " " span.muted.nowrap { (percent_interval(if grows { [-high, -low] } else { [low, high] })) }
+                    }
                 }
                 td data-label="cannot be told from" {
                     @if apart.is_empty() { span.muted { "nothing" } } @else { (apart.join(", ")) }

@@ -90,7 +90,7 @@ pub fn picture(title: &str, joints: &[String], regimes: &[Regime]) -> Option<Str
     };
     let names: Vec<String> = columns.iter().map(name).collect();
     let cell = |regime: &Regime| Cell {
-        shade: if regime.share.is_finite() { regime.share } else { 0.0 },
+        shade: surplus(regime),
         text: whole_percent(regime.share),
         framed: words::stands_out(regime),
         tip: tip(regime),
@@ -99,7 +99,7 @@ pub fn picture(title: &str, joints: &[String], regimes: &[Regime]) -> Option<Str
         .map(|row| columns.iter().map(|(_, c)| c.cells.get(row).copied().flatten().map(cell)).collect())
         .collect();
     let rows: Vec<String> = joints.into_iter().cloned().collect();
-    let note = "Framed: at least 1.5 times the regime’s part of the samples. Regimes overlap.";
+    let note = "Shaded beyond the regime’s part of the samples; framed from 1.5 times that part. Regimes overlap.";
     Some(Matrix { title, sides: ["joint", "regime"], rows: &rows, columns: &names, cells: &cells, note }.svg())
 }
 
@@ -109,13 +109,7 @@ fn cell(regime: Option<&Regime>, first: bool, quiet: bool) -> Markup {
     };
     // Where a gap is noise, its shares are those of noise.
     let marked = !quiet && words::stands_out(regime);
-    let shade = if quiet {
-        0.0
-    } else if regime.share.is_finite() {
-        regime.share.clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
+    let shade = if quiet { 0.0 } else { surplus(regime) };
     html! {
         td.marked[marked] .first[first] style={ "--a:" (super::chart::short(shade)) } title=(tip(regime)) {
             (whole_percent(regime.share))
@@ -124,6 +118,12 @@ fn cell(regime: Option<&Regime>, first: bool, quiet: bool) -> Markup {
             }
         }
     }
+}
+
+/// By how much a regime's share exceeds its part of the samples. A third of the gap in a third of the samples says nothing.
+fn surplus(regime: &Regime) -> f64 {
+    let surplus = regime.share - regime.samples;
+    if surplus.is_finite() { surplus.clamp(0.0, 1.0) } else { 0.0 }
 }
 
 fn tip(regime: &Regime) -> String {
@@ -145,12 +145,13 @@ fn whole_percent(share: f64) -> String {
 fn legend(whole: &str) -> Markup {
     html! {
         p.legend {
+            "Figures: share of " (whole) ", %. "
             span.ramp aria-hidden="true" { "0" i {} "100" }
-            " share of " (whole) ", %. "
+            " shade: by how much the share exceeds the regime’s part of the samples. "
             span.key aria-hidden="true" { "62" small { "7.8×" } }
-            " framed: the regime holds at least 1.5 times its part of the samples, and its whole 95 % interval lies above; "
-            "the small figure is share ÷ samples. Regimes overlap, so a row does not add up to 100. Shares are of the square: "
-            "half the rms is a quarter of it. Joints at the noise floor stay pale."
+            " framed: at least 1.5 times that part, with the whole 95 % interval above; the small figure is share ÷ samples. "
+            "Regimes overlap, so a row does not add up to 100. Shares are of the square: half the rms is a quarter of it. "
+            "Joints at the noise floor stay pale."
         }
     }
 }

@@ -6,6 +6,7 @@ mod answer;
 pub mod axis;
 mod bars;
 mod chart;
+pub mod clause;
 mod curves;
 mod effects;
 mod format;
@@ -23,7 +24,7 @@ mod rollout;
 mod scene;
 pub mod score;
 mod series;
-mod servo;
+pub mod servo;
 mod setting;
 mod shrink;
 mod skeleton;
@@ -35,6 +36,8 @@ mod words;
 pub(crate) mod sample;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::browser::look;
 
 use gapscope_datasets::{Doubt, Fault};
 use gapscope_diagnosis::schema::{Diagnosis, Evidence, Verdict};
@@ -55,11 +58,11 @@ pub use power::line as power_line;
 pub use rest::sentence as sentence_of_the_rest;
 pub use rollout::page as rollout_page;
 pub use series::picture as series_picture;
-pub use servo::{Beside, answer as servo_answer, follows as servo_follows, html as servo_html};
+pub use servo::{Beside, answer as servo_answer, html as servo_html};
 pub use setting::Setting;
 pub use words::{
-    capital, effect, effects, implied_unit, interval, joints as joint_list, motion_unit, outstanding, parameter,
-    regime, regime_phrase, rest as words_of_the_rest, said_of, verdict,
+    capital, effect, effects, implied_unit, in_words, interval, joints as joint_list, list, motion_unit, outstanding,
+    parameter, regime, regime_phrase, rest as words_of_the_rest, said_of, verdict,
 };
 
 /// Colours, type and layout; light and dark, wide, narrow and print.
@@ -184,9 +187,10 @@ fn header(gauge: &Gauge, top: &Top, scene: Option<&scene::Scene>) -> Markup {
                     h1 class=(tone(top.verdict)) { (words::verdict(top.verdict)) }
                     @for fault in top.faults { p.fault role="alert" { b { "Fault of the data. " } (ticked(&crate::input::fault_line(fault))) } }
                     @for doubt in top.doubts { p.fault { b { "In doubt. " } (ticked(&doubt.question)) } }
-                    div.said { @for line in &top.said { p { (line) } } }
+                    div.said { @for line in &top.said { p { (unbroken(line)) } } }
                 }
-                (skeleton::render(gauge, scene))
+                (skeleton::picture(gauge, scene))
+                (skeleton::list(gauge))
             }
         }
     }
@@ -257,7 +261,7 @@ fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Set
 /// The sections that rest on an evaluation: left out where the logs allowed none.
 fn figures(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
     let quiet = |joint: &str| !is_above_floor(diagnosis, joint);
-    let sentences = answer::sentences(diagnosis, evidence);
+    let [place, _, how_far] = answer::sentences(diagnosis, evidence);
     let no_law = if diagnosis.effects.is_empty() {
         "No effect was found, so there is no law to draw."
     } else {
@@ -269,17 +273,21 @@ fn figures(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence) -> Markup 
         (section("joints", "Torque gap by joint", "Measured torque less what the model needs for the same motion, rms on held-out data.",
             &joints::render(gauge)))
         (section("regimes", "Where the gap lies", "Share of each regime in its joint’s squared torque gap, for the model as described, on held-out data.",
-            &heatmap::render(&diagnosis.joints, &diagnosis.gap.regimes, "Gap by joint and regime", "the joint’s squared torque gap", &quiet)))
+            &html! {
+                p.point { (unbroken(&place)) }
+                (heatmap::render(&diagnosis.joints, &diagnosis.gap.regimes, "Gap by joint and regime", "the joint’s squared torque gap", &quiet))
+            }))
         (section("shrink", "How far it shrinks", "", &html! {
-            dl.answer {
-                @for (question, sentence) in ["Where", "Which", "How far"].into_iter().zip(sentences) {
-                    div { dt { (question) } dd { (sentence.replace('–', "–\u{2060}")) } }
-                }
-            }
+            p.point { (unbroken(&how_far)) }
             (shrink::render(diagnosis))
         }))
         (section("left", "What is left unexplained", "", &rest::unexplained(diagnosis)))
     }
+}
+
+/// A text whose ranges stay in one line.
+fn unbroken(text: &str) -> String {
+    text.replace('–', "–\u{2060}")
 }
 
 /// Names of joints for the page's filter, as JSON; none stands for the whole robot.

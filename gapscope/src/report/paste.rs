@@ -3,62 +3,79 @@
 use super::setting::Setting;
 use super::words;
 use gapscope_diagnosis::schema::Diagnosis;
+use gapscope_export::TargetLedger;
 use maud::{Markup, html};
 
-/// The box and the table below it; `None` where no effect was found.
+/// The boxes and the tables below them; `None` where no effect was found.
 pub fn render(diagnosis: &Diagnosis, setting: &Setting, robot: &str) -> Option<Markup> {
     if diagnosis.effects.is_empty() {
         return None;
     }
     let command = format!("gapscope export FOLDER --robot {robot} --to urdf,mjcf");
-    let Some(ledger) = &setting.ledger else {
+    let [own, others @ ..] = setting.ledgers.as_slice() else {
         return Some(html! {
             p { "The corrected model for your simulator, where FOLDER is the one that holds this report:" }
-            (boxed("paste", &command))
+            (super::reproduce::boxed("export", &command))
         });
     };
-    let text: Vec<String> = ledger
-        .paste
-        .iter()
-        .filter_map(|line| line.split_once(": "))
-        .map(|(joint, element)| format!("<!-- in your URDF, joint {joint} -->\n{element}"))
-        .collect();
+    let pasted = setting.ledgers.iter().any(|ledger| !ledger.paste.is_empty());
     Some(html! {
-        @if text.is_empty() {
-            p { "Nothing here is a number of one joint’s friction. The whole corrected file, where FOLDER is the one that holds this report:" }
-            (boxed("paste", &command))
-        } @else {
-            p { "Damping and friction in all, what the file had included: N m s/rad and N m, N s/m and N where a joint slides." }
-            (boxed("paste", &text.join("\n")))
+        @if pasted {
+            p { "Numbers are totals: what the file had is included. Units are those of the joint: N m s/rad and N m, N s/m and N where it slides." }
+            (one(own))
+            @for other in others { (one(other)) }
             p { "Or all of it at once, where FOLDER is the one that holds this report:" }
-            (boxed("export", &command))
+        } @else {
+            p { "Nothing here is a number of one joint. The whole corrected file, where FOLDER is the one that holds this report:" }
         }
-        details {
-            summary { "What a URDF holds of each effect" }
-            div.scroll tabindex="0" role="region" aria-label="What a URDF holds of each effect" {
-                table.plain {
-                    thead { tr { th scope="col" { "effect" } th scope="col" { "joints" } th scope="col" { "in a URDF" } th scope="col" { "as" } } }
-                    tbody {
-                        @for entry in &ledger.effects {
-                            tr data-joints=(super::listed(&entry.joints)) {
-                                td { (words::capital(&words::effect(&entry.kind))) }
-                                td { (words::joints(&entry.joints, &diagnosis.joints)) }
-                                td { (entry.how.words()) }
-                                td { (super::ticked(&entry.r#as)) }
-                            }
-                        }
-                    }
-                }
+        (super::reproduce::boxed("export", &command))
+        @for ledger in &setting.ledgers {
+            details {
+                summary { "What " (format_of(ledger)) " holds of each effect" }
+                (table(ledger, diagnosis))
             }
         }
     })
 }
 
-fn boxed(id: &str, text: &str) -> Markup {
+fn format_of(ledger: &TargetLedger) -> &'static str {
+    if ledger.target == "mjcf" { "an MJCF" } else { "a URDF" }
+}
+
+/// What to paste into one format, a line for each joint.
+fn one(ledger: &TargetLedger) -> Markup {
+    let mjcf = ledger.target == "mjcf";
+    let lines: Vec<(&str, &str)> = ledger.paste.iter().filter_map(|line| line.split_once(": ")).collect();
+    let line = |(joint, text): &(&str, &str)| match mjcf {
+        true => format!("{joint}:  {text}"),
+        false => format!("{text}  <!-- {joint} -->"),
+    };
+    let text: Vec<String> = lines.iter().map(line).collect();
     html! {
-        div.paste {
-            pre id=(id) tabindex="0" { (text) }
-            button.needs-script type="button" data-copy=(id) { "Copy" }
+        @if !text.is_empty() {
+            h3 { @if mjcf { "Attributes for the joints of an MJCF" } @else { "Elements for the joints of a URDF" } }
+            (super::reproduce::boxed(&format!("paste-{}", ledger.target), &text.join("\n")))
+        }
+    }
+}
+
+fn table(ledger: &TargetLedger, diagnosis: &Diagnosis) -> Markup {
+    let name = format!("What {} holds of each effect", format_of(ledger));
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(name) {
+            table.plain {
+                thead { tr { th scope="col" { "effect" } th scope="col" { "joints" } th scope="col" { "there" } th scope="col" { "as" } } }
+                tbody {
+                    @for entry in &ledger.effects {
+                        tr data-joints=(super::listed(&entry.joints)) {
+                            td { (words::capital(&words::effect(&entry.kind))) }
+                            td { (words::joints(&entry.joints, &diagnosis.joints)) }
+                            td { (entry.how.words()) }
+                            td { (super::ticked(&entry.r#as)) }
+                        }
+                    }
+                }
+            }
         }
     }
 }

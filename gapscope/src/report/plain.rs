@@ -3,10 +3,10 @@
 //! The terminal and the page begin with these very words.
 
 use super::answer::largest;
-use super::format::{count, estimate, figure, percent, significant, span, with_unit};
-use super::words;
+use super::format::{count, figure, percent, with_unit};
+use super::{clause, words};
 use gapscope_datasets::Fault;
-use gapscope_diagnosis::schema::{Combination, Diagnosis, FoundEffect, Parameter, Verdict};
+use gapscope_diagnosis::schema::{Combination, Diagnosis, FoundEffect, Verdict};
 
 /// Effects that the first sentence names beside the strongest.
 const FURTHER: usize = 2;
@@ -33,19 +33,17 @@ fn cause(diagnosis: &Diagnosis) -> String {
 /// The strongest effect in a clause, the next by name, the rest by number; `sums` are what is known of bodies.
 pub fn effects(list: &[FoundEffect], all: &[String], sums: &[Combination]) -> String {
     let [first, rest @ ..] = list else { return String::new() };
-    let mut named: Vec<String> = rest
-        .iter()
-        .take(FURTHER)
-        .map(|e| match words::joints(&e.joints, all) {
-            _ if e.joints.is_empty() => words::effect(&e.kind),
-            place => format!("{} ({place})", words::effect(&e.kind)),
-        })
-        .collect();
+    // A place that is the first one's need not be said again.
+    let named = |e: &FoundEffect| match words::joints_in_a_sentence(&e.joints, all) {
+        _ if e.joints.is_empty() || e.joints == first.joints => words::effect(&e.kind),
+        place => format!("{} at {place}", words::effect(&e.kind)),
+    };
+    let mut named: Vec<String> = rest.iter().take(FURTHER).map(named).collect();
     if rest.len() > FURTHER {
         named.push(count(rest.len() - FURTHER, "weaker effect"));
     }
     let also = if named.is_empty() { String::new() } else { format!(" Beside it: {}.", words::list(&named, "and")) };
-    format!("{}.{also}", clause(first, all, sums))
+    format!("{}.{also}", clause::of(first, all, sums))
 }
 
 /// The effects as they are read: links that differ are one thing, as their torques are, of which the logs tell the sums.
@@ -69,85 +67,6 @@ pub fn together(diagnosis: &Diagnosis) -> Vec<FoundEffect> {
         (other.shrink.torque, other.shrink.ci95) = (None, None);
     }
     read
-}
-
-/// `mass of link5 and all it carries off by −0.76 ± 0.04 kg`.
-pub fn combination(sum: &Combination) -> String {
-    let (value, half) = (sum.value, 0.5 * (sum.ci95[1] - sum.ci95[0]));
-    let (value, half) = (significant(value, 3), significant(half, 2));
-    format!("{} off by {}", sum.words, with_unit(&format!("{value} ± {half}"), &sum.unit))
-}
-
-/// `joint3 rubs: 2.1 N m of dry friction that the model lacks`.
-fn clause(effect: &FoundEffect, all: &[String], sums: &[Combination]) -> String {
-    let place = words::joints(&effect.joints, all);
-    let (subject, several) = match effect.joints.as_slice() {
-        [] => ("The robot".to_owned(), false),
-        [one] => (one.clone(), false),
-        _ => (words::capital(&place), true),
-    };
-    let verb = |one: &str, many: &str| if several { many.to_owned() } else { one.to_owned() };
-    let size = |name: &str| effect.parameters.get(name).and_then(value);
-    let lacking = |verb: String, size: Option<String>, what: &str| match size {
-        Some(size) => format!("{subject} {verb}: {size} of {what} that the model lacks"),
-        None => format!("{subject} {verb}: {what} that the model lacks"),
-    };
-    match effect.kind.as_str() {
-        "coulomb_friction" => lacking(verb("rubs", "rub"), size("coulomb"), "dry friction"),
-        "viscous_friction" => lacking(verb("rubs with speed", "rub with speed"), size("viscous"), "viscous friction"),
-        "stribeck_friction" => {
-            lacking(verb("rubs most near rest", "rub most near rest"), size("static"), "friction at rest")
-        }
-        "payload" => lacking(verb("carries", "carry"), size("mass"), "payload"),
-        "armature" => lacking(verb("turns", "turn") + " a rotor", size("armature"), "rotor inertia"),
-        "torque_bias" => lacking(verb("is", "are") + " pushed one way", size("bias"), "constant torque"),
-        "actuation_delay" => lacking(verb("acts", "act") + " late", size("delay"), "delay"),
-        "actuator_lag" => lacking(verb("follows", "follow") + " with a lag", size("time_constant"), "lag"),
-        "backlash" => lacking(verb("has", "have") + " play", size("gap"), "play"),
-        "link_inertia_error" => {
-            let links = if several { "The links of" } else { "The link of" };
-            let surest = sums.iter().find(|sum| sum.differs());
-            let size = surest.map_or(String::new(), |sum| format!(": {}", combination(sum)));
-            format!("{links} {place} {} not as the model has {}{size}", verb("is", "are"), verb("it", "them"))
-        }
-        "gravity_misalignment" => "The base is tilted, and the model takes it to be level".into(),
-        "torque_gain_error" => {
-            let gain = size("gain").map_or(String::new(), |gain| format!("{gain} times "));
-            format!("{subject} {} {gain}the torque that is logged", verb("delivers", "deliver"))
-        }
-        // Of servo arms.
-        "speed_limit" if size("limit").is_some() => {
-            format!("{subject} {} no faster than {}", verb("turns", "turn"), size("limit").unwrap_or_default())
-        }
-        "servo_gain_error" if size("gain").is_some() => {
-            format!("At {place} the servo pulls {} times as hard as was given", size("gain").unwrap_or_default())
-        }
-        "dead_band" if size("width").is_some() => {
-            format!("At {place} the servo rests within {} of its set point", size("width").unwrap_or_default())
-        }
-        kind => {
-            let at = if effect.joints.is_empty() { String::new() } else { format!(" at {place}") };
-            let values: Vec<String> = effect
-                .parameters
-                .iter()
-                .filter_map(|(name, p)| Some(words::said_of(kind, name, &value(p)?)))
-                .take(2)
-                .collect();
-            let values = if values.is_empty() { String::new() } else { format!(" ({})", values.join(", ")) };
-            format!("The model lacks one thing{at}: {}{values}", words::effect(kind))
-        }
-    }
-}
-
-/// A value, or the span of the joints'; vectors are left to the table.
-fn value(parameter: &Parameter) -> Option<String> {
-    let one = match parameter {
-        Parameter::Single(single) => single,
-        Parameter::PerJoint(map) if map.len() == 1 => map.values().next()?,
-        Parameter::PerJoint(map) => return span(map.values()),
-    };
-    let printed = estimate(one);
-    (printed.components.len() == 1).then(|| with_unit(&printed.value, &printed.unit))
 }
 
 fn reach(diagnosis: &Diagnosis) -> String {
@@ -189,7 +108,8 @@ fn caution(diagnosis: &Diagnosis) -> String {
         );
     }
     if diagnosis.verdict == Verdict::NotExcited {
-        let next = diagnosis.next_experiment.as_ref().map(|next| next.motion.trim_end_matches('.'));
+        let motion = diagnosis.next_experiment.as_ref().map(|next| words::in_words(&next.motion));
+        let next = motion.as_ref().map(|motion| motion.trim_end_matches('.'));
         return next.map_or("Log a longer motion of every joint, both ways.".into(), |m| format!("Next: {m}."));
     }
     if let Some(tie) = tie(diagnosis) {
@@ -240,6 +160,7 @@ pub fn first_tie(effects: &[FoundEffect]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::report::sample;
+    use gapscope_diagnosis::schema::Parameter;
 
     #[test]
     fn the_answer_is_three_short_sentences() {

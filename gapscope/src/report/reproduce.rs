@@ -8,6 +8,8 @@ use std::path::Path;
 const DIGITS: usize = 16;
 /// Logs that are listed at once; the rest folds away.
 const LISTED: usize = 8;
+/// What stands in a command for logs that it does not name: none are known, or more than are read.
+const LOGS: &str = "LOG...";
 
 /// What a diagnosis was made of, and what it wrote.
 pub struct Made<'a> {
@@ -33,7 +35,8 @@ pub fn render(made: &Made) -> Markup {
     };
     let robot = or(made.robot, "ROBOT.urdf");
     let logs: Vec<String> = made.logs.iter().map(|log| quote(&shown(log))).collect();
-    let logs = if logs.is_empty() { "LOG...".into() } else { logs.join(" ") };
+    let many = logs.len() > LISTED;
+    let logs = if logs.is_empty() || many { LOGS.into() } else { logs.join(" ") };
     let with = made.corrected.map_or_else(String::new, |file| format!(" --with {}", or(file, "corrected.json")));
     let options = &made.options;
     let commands = [
@@ -55,13 +58,23 @@ pub fn render(made: &Made) -> Markup {
         (digests(made))
         @for (i, (what, command)) in commands.iter().enumerate() {
             p { (what) ":" }
-            @let id = format!("command-{i}");
-            div.paste {
-                pre id=(id) tabindex="0" { (command) }
-                button.needs-script type="button" data-copy=(id) { "Copy" }
-            }
+            (boxed(&format!("command-{i}"), command))
         }
+        @if many { p.note { code { (LOGS) } " stands for the " (made.logs.len()) " logs above, in their order." } }
         p.note { "Names are relative to the folder in which the command was called, or bare where it was given a whole path." }
+    }
+}
+
+/// Text to copy. Its lines break between words alone: half a flag is none.
+pub fn boxed(id: &str, text: &str) -> Markup {
+    let line = |line: &str| {
+        html! { @for (i, word) in line.split(' ').enumerate() { @if i > 0 { " " } @if !word.is_empty() { span.word { (word) } } } }
+    };
+    html! {
+        div.paste {
+            pre id=(id) tabindex="0" { @for (i, text) in text.split('\n').enumerate() { @if i > 0 { "\n" } (line(text)) } }
+            button.needs-script type="button" data-copy=(id) { "Copy" }
+        }
     }
 }
 

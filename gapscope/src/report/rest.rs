@@ -6,6 +6,9 @@ use super::{heatmap, words};
 use gapscope_diagnosis::schema::{Combination, Diagnosis, Evidence, Gap, Verdict};
 use maud::{Markup, html};
 
+/// Findings that are listed at once; the rest folds away.
+const LISTED: usize = 12;
+
 /// What is left after the effects, and where.
 pub fn unexplained(diagnosis: &Diagnosis) -> Markup {
     let left = &diagnosis.unexplained;
@@ -99,8 +102,8 @@ pub fn next_experiment(diagnosis: &Diagnosis, playable: bool) -> Markup {
     let kinds: Vec<String> = next.separates.iter().map(|kind| words::effect(kind)).collect();
     html! {
         div.callout {
-            p { b { (super::ticked(&next.motion)) } }
-            p { (super::ticked(&next.why)) }
+            p { b { (super::ticked(&words::in_words(&next.motion))) } }
+            p { (super::ticked(&words::in_words(&next.why))) }
             @if let Some(file) = &next.trajectory {
                 p { code { (file) } " beside this report holds time, position, velocity and acceleration of every joint, from rest to rest, within the URDF’s limits. Diagnose its log together with these." }
             }
@@ -154,9 +157,16 @@ pub fn data(read: &Read) -> Markup {
         @if read.findings.is_empty() {
             p { "None: nothing odd in the robot description or the logs." }
         } @else {
-            ul.findings { @for finding in read.findings { li { (super::ticked(finding)) } } }
+            (listed(&read.findings[..read.findings.len().min(LISTED)]))
+            @if read.findings.len() > LISTED {
+                details { summary { "and " (group(read.findings.len() - LISTED)) " more" } (listed(&read.findings[LISTED..])) }
+            }
         }
     }
+}
+
+fn listed(findings: &[String]) -> Markup {
+    html! { ul.findings { @for finding in findings { li { (super::ticked(finding)) } } } }
 }
 
 /// Gap of every joint in its own units, before and, where known, after.

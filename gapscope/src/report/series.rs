@@ -21,6 +21,9 @@ const STRETCHES_ONE: usize = 500;
 /// Joints whose pictures stand open; of more only the one that is shown in full.
 const OPEN: usize = 1;
 
+/// Episodes whose ends a picture shows; of more the lines run on, as one pixel holds several.
+const EPISODES: usize = 60;
+
 /// Longest stretch in a picture of its own, s, and what its lines are thinned to.
 const WINDOW: f64 = 12.0;
 const THIN: usize = 240;
@@ -80,12 +83,17 @@ pub fn packets(gauge: &Gauge) -> Vec<Packet<'_>> {
     gauge.series.iter().map(|series| packet(series, stretches)).collect()
 }
 
+/// Where episodes begin, as far as a picture shows it.
+fn breaks(series: &Series) -> &[usize] {
+    if series.breaks.len() < EPISODES { &series.breaks } else { &[] }
+}
+
 fn packet(series: &Series, stretches: usize) -> Packet<'_> {
     let lines = [&series.measured, &series.nominal, &series.corrected];
     let mut kept: Vec<usize> = lines
         .iter()
         .filter(|l| l.len() == series.time.len())
-        .flat_map(|l| envelope(l, &series.breaks, stretches))
+        .flat_map(|l| envelope(l, breaks(series), stretches))
         .collect();
     kept.sort_unstable();
     kept.dedup();
@@ -101,7 +109,7 @@ fn packet(series: &Series, stretches: usize) -> Packet<'_> {
         m: of(&series.measured, step),
         n: of(&series.nominal, step),
         c: of(&series.corrected, step),
-        breaks: series.breaks.iter().filter_map(|b| kept.binary_search(b).ok()).collect(),
+        breaks: breaks(series).iter().filter_map(|b| kept.binary_search(b).ok()).collect(),
     }
 }
 
@@ -159,7 +167,7 @@ fn shade(series: &Series, stretches: usize, x: &Axis, y: &Axis) -> Markup {
     if gap.len() != series.time.len() {
         return html! {};
     }
-    let kept = envelope(&gap, &series.breaks, stretches);
+    let kept = envelope(&gap, breaks(series), stretches);
     let points: Vec<[f64; 3]> = kept.iter().map(|&i| [series.time[i], series.nominal[i], series.measured[i]]).collect();
     band(&points, x, y, "gap")
 }
@@ -178,13 +186,13 @@ fn joint(series: &Series, gap: Option<&JointGap>, what: &str, stretches: usize) 
             return html! {};
         }
         let length = n.min(values.len());
-        let kept = envelope(&values[..length], &series.breaks, stretches);
-        let breaks: Vec<usize> = series.breaks.iter().filter_map(|b| kept.binary_search(b).ok()).collect();
-        line(kept.iter().map(|&i| [series.time[i], values[i]]), &breaks, &x, y, class)
+        let kept = envelope(&values[..length], breaks(series), stretches);
+        let lifts: Vec<usize> = breaks(series).iter().filter_map(|b| kept.binary_search(b).ok()).collect();
+        line(kept.iter().map(|&i| [series.time[i], values[i]]), &lifts, &x, y, class)
     };
     let labelled = series.breaks.len() <= 4;
     let rules = |text: bool| -> Vec<(f64, String)> {
-        let places = series.breaks.iter().enumerate().filter(|&(_, &b)| b > 0 && b < n);
+        let places = breaks(series).iter().enumerate().filter(|&(_, &b)| b > 0 && b < n);
         places
             .map(|(i, &b)| {
                 (series.time[b], if text && labelled { format!("episode {}", i + 2) } else { String::new() })

@@ -1,7 +1,7 @@
 //! The report of a servo arm: the same page as of a robot whose logs hold torque, of position under the set points.
 
 mod answer;
-mod schema;
+pub mod schema;
 
 use super::format::{self, percent, percent_interval, with_unit};
 use super::gauge::{Figure, Gauge, JointGap};
@@ -17,7 +17,7 @@ use gapscope_servo::{Evidence, Outcome, Signal};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
-pub use answer::answer;
+pub use answer::{answer, nominal};
 
 /// Part of a joint's samples whose speed a curve shows: the fastest are noise of the encoder.
 const USUAL: f64 = 0.99;
@@ -56,6 +56,21 @@ impl Beside {
             day: setting::today(),
             ..Beside::default()
         }
+    }
+
+    /// What is wrong with the logs beyond doubt.
+    pub fn faults(&self) -> &[Fault] {
+        &self.faults
+    }
+
+    /// What may be wrong with them.
+    pub fn doubts(&self) -> &[Doubt] {
+        &self.doubts
+    }
+
+    /// Both in lines, as the findings have them.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// Adds what a diagnosis made of the logs.
@@ -143,7 +158,7 @@ fn gauge(diagnosis: &Diagnosis, evidence: &Evidence, beside: &Beside) -> Gauge {
     };
     Gauge {
         what: "position",
-        nominal: answer::nominal(diagnosis),
+        nominal: nominal(diagnosis),
         corrected: "the arm found here",
         robot: diagnosis.robot.clone(),
         joints: diagnosis.joints.iter().map(joint).collect(),

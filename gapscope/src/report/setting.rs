@@ -13,8 +13,8 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 pub struct Setting {
     /// The robot's skeleton.
     pub scene: Option<Scene>,
-    /// What a URDF holds of the corrections; `None` for another description.
-    pub ledger: Option<TargetLedger>,
+    /// What URDF and MJCF hold of the corrections, the format of the robot's own description first.
+    pub ledgers: Vec<TargetLedger>,
     /// Digests of model and logs.
     pub origin: Option<Origin>,
     /// The day on which it was made, `2026-01-31`, UTC.
@@ -32,17 +32,18 @@ impl Setting {
         description: &Description,
         loaded: Option<&Loaded>,
     ) -> Setting {
-        let ledger = loaded.and_then(|loaded| {
+        let ledgers = loaded.map_or_else(Vec::new, |loaded| {
             let robot =
                 Robot { text: description.text(), loaded, is_mjcf: description.is_mjcf(), dt: gapscope_export::DT };
             // A robot that has no URDF has nothing to paste into it.
-            Some(export(Target::Urdf, &robot, corrected, &[]).ok()?.ledger)
+            let targets = [Target::Urdf, Target::Mjcf].into_iter();
+            targets.filter_map(|target| Some(export(target, &robot, corrected, &[]).ok()?.ledger)).collect()
         });
         let mut scene = Scene::new(model, episodes).with_rollouts(model, episodes, corrected);
         if let Some(trajectory) = next {
             scene = scene.with_motion(model, trajectory);
         }
-        Setting { scene: Some(scene), ledger, origin: corrected.made_from.clone(), made: today() }
+        Setting { scene: Some(scene), ledgers, origin: corrected.made_from.clone(), made: today() }
     }
 }
 

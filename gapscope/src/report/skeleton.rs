@@ -21,21 +21,28 @@ fn tone(bold: Option<f64>) -> (&'static str, String) {
     }
 }
 
-/// Picture, its controls and the list; without a scene the list alone.
-pub fn render(gauge: &Gauge, scene: Option<&Scene>) -> Markup {
-    html! {
-        div.robot {
-            @if let Some((scene, still)) = scene.and_then(|s| Some((s, s.frames.get(s.still())?))) {
-                (picture(gauge, scene, still))
-            }
-            (chips(gauge))
-        }
-    }
-}
+/// Where a number may stand beside the end of its joint, the best place first; and how far numbers stand apart, in parts of
+/// the picture's half width. The script does the same.
+const BESIDE: [[f64; 2]; 8] = [
+    [0.05, -0.04],
+    [-0.11, -0.04],
+    [0.05, 0.1],
+    [-0.11, 0.1],
+    [0.18, 0.03],
+    [-0.24, 0.03],
+    [0.05, -0.18],
+    [-0.11, -0.18],
+];
+const APART: [f64; 2] = [0.12, 0.12];
+/// No number stands nearer to the upper and lower edge of the picture.
+const EDGE: f64 = 0.92;
 
-fn picture(gauge: &Gauge, scene: &Scene, still: &[DVec3]) -> Markup {
+/// Picture and controls; nothing without a scene.
+pub fn picture(gauge: &Gauge, scene: Option<&Scene>) -> Markup {
+    let Some((scene, still)) = scene.and_then(|s| Some((s, s.frames.get(s.still())?))) else { return html! {} };
     let view = View::of(scene);
     let point = |p: DVec3| view.project(p);
+    let ends: Vec<[f64; 2]> = (0..scene.joints.len()).map(|j| point(still[2 * j + 1])).collect();
     let middle = |j: usize| 0.5 * (still[2 * j] + still[2 * j + 1]);
     let n = scene.joints.len();
     let floor: Vec<String> = (0..=FLOOR)
@@ -65,7 +72,12 @@ fn picture(gauge: &Gauge, scene: &Scene, still: &[DVec3]) -> Markup {
                     g class={ "joint " (class) } style=(style) data-joint=(name) {
                         title { (name) }
                         line.barrel x1=(short3(x1)) y1=(short3(y1)) x2=(short3(x2)) y2=(short3(y2)) {}
-                        text x=(short3(x2)) y=(short3(y2)) dx=".05" dy="-.04" { (j + 1) }
+                    }
+                }
+                // Above all joints, or those in front would hide them.
+                g.labels aria-hidden="true" {
+                    @for (j, [x, y]) in labels(&ends).iter().enumerate() {
+                        text x=(short3(*x)) y=(short3(*y)) { (j + 1) }
                     }
                 }
             }
@@ -84,13 +96,26 @@ fn picture(gauge: &Gauge, scene: &Scene, still: &[DVec3]) -> Markup {
     }
 }
 
+/// Where the numbers of joints stand whose barrels end here: beside them, and not on each other.
+fn labels(ends: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut placed: Vec<[f64; 2]> = vec![];
+    for [x, y] in ends {
+        let at = |[dx, dy]: [f64; 2]| [x + dx, y + dy];
+        let apart = |p: &[f64; 2], o: &[f64; 2]| (p[0] - o[0]).abs() >= APART[0] || (p[1] - o[1]).abs() >= APART[1];
+        let free = |p: &[f64; 2]| p[1].abs() <= EDGE && placed.iter().all(|o| apart(p, o));
+        let place = BESIDE.into_iter().map(at).find(free).unwrap_or(at(BESIDE[0]));
+        placed.push(place);
+    }
+    placed
+}
+
 /// Joints whose numbers stand beside them; of more each shows as it is pointed at.
 const LABELLED: usize = 12;
 
 /// One entry for each joint: number, name, gap.
-fn chips(gauge: &Gauge) -> Markup {
+pub fn list(gauge: &Gauge) -> Markup {
     html! {
-        ol.chips aria-label={ (super::words::capital(gauge.what)) " gap of each joint" } {
+        ol.chips.many[gauge.joints.len() > LABELLED] aria-label={ (super::words::capital(gauge.what)) " gap of each joint" } {
             @for joint in &gauge.joints {
                 @let bold = gauge.boldness(joint);
                 @let (class, style) = tone(bold);
@@ -136,4 +161,19 @@ impl View {
 
 fn short3(value: f64) -> String {
     if value.is_finite() { format!("{value:.3}") } else { "0".into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_joints_in_one_place_stand_apart() {
+        let placed = labels(&[[0.0, 0.0]; 5]);
+        for (i, a) in placed.iter().enumerate() {
+            for b in &placed[..i] {
+                assert!((a[0] - b[0]).abs() >= APART[0] || (a[1] - b[1]).abs() >= APART[1], "{a:?} {b:?}");
+            }
+        }
+    }
 }

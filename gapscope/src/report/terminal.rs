@@ -48,6 +48,13 @@ pub fn pad(text: &str, width: usize) -> String {
     text + &" ".repeat(fill)
 }
 
+/// A name filled to `width` columns and never cut: names differ at their ends.
+pub fn name(text: &str, width: usize) -> String {
+    let clean = clean(text);
+    let fill = width.saturating_sub(clean.chars().count());
+    clean + &" ".repeat(fill)
+}
+
 /// Text filled from the left to `width` columns.
 pub fn fill(text: &str, width: usize) -> String {
     " ".repeat(width.saturating_sub(text.chars().count())) + text

@@ -1,5 +1,9 @@
 //! The page as a whole: well formed, escaped, finite, small, and the same every time.
 
+#[path = "../../tests/all/browser.rs"]
+#[allow(clippy::print_stdout)]
+pub mod browser;
+
 use super::*;
 use gapscope_diagnosis::schema::FoundEffect;
 use gapscope_diagnosis::schema::Parameter;
@@ -60,7 +64,9 @@ fn every_verdict_is_well_formed_finite_small_and_repeatable() {
         assert_eq!(page, html(&diagnosis, &evidence, &Setting::default()), "{name}");
         assert!(
             page.contains(words::verdict(diagnosis.verdict))
-                && plain::answer(&diagnosis).iter().all(|line| page.contains(&maud::html! { (line) }.into_string()))
+                && plain::answer(&diagnosis)
+                    .iter()
+                    .all(|line| page.contains(&maud::html! { (unbroken(line)) }.into_string()))
         );
         let of_bodies = page.contains("Mass of panda_link7 and all it carries");
         assert_eq!(of_bodies, !diagnosis.combinations.is_empty(), "{name}");
@@ -119,7 +125,7 @@ fn shows_units_and_intervals() {
     for part in [
         "<b>1.51</b>\u{a0}N\u{a0}m",
         "[1.47,\u{a0}1.55]",
-        "4.20\u{a0}ms",
+        "<b>4.20</b>",
         "speed, rad/s",
         "torque, N m",
         "horizon, s",
@@ -199,4 +205,30 @@ fn the_page_of_a_score_is_well_formed_and_finite() {
         assert_eq!(calibration(&score).matches("<circle").count(), score.calibration.len());
         assert_eq!(size(&score).matches("<circle").count(), score.visibility.len());
     }
+}
+
+#[test]
+fn thirty_joints_with_long_names_and_a_thousand_episodes_have_a_page_that_works() {
+    let ((name, diagnosis, evidence), setting) = sample::large();
+    let page = html(&diagnosis, &evidence, &setting);
+    check_balance(name, &page);
+    assert!(page.len() < 2_000_000, "{} bytes", page.len());
+    // A command that names a thousand logs is none that a person copies.
+    assert!(page.contains(">LOG...</span>") && page.contains("stands for the 1000 logs above"));
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("report.html");
+    std::fs::write(&file, &page).unwrap();
+    look(&[&file], &[]);
+}
+
+#[test]
+fn the_page_of_every_verdict_works_in_a_browser() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |(name, diagnosis, evidence): (&str, Diagnosis, Evidence)| {
+        let file = dir.path().join(name).join("report.html");
+        crate::output::write(&file, &html(&diagnosis, &evidence, &Setting::default())).unwrap();
+        file
+    };
+    let files: Vec<_> = sample::all().into_iter().map(write).collect();
+    look(&files.iter().map(|file| file.as_path()).collect::<Vec<_>>(), &[]);
 }

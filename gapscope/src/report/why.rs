@@ -42,7 +42,7 @@ fn entry(why: &Why, joints: &[String]) -> Markup {
             span {
                 (words::capital(&words::effect(&why.proposed)))
                 @if !why.joints.is_empty() { " at " (words::joints(&why.joints, joints)) }
-                span.muted { " against " (why.against.replace('_', " ")) }
+                span.muted { " against " (words::in_words(&why.against)) }
             }
         }
     }

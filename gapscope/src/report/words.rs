@@ -21,6 +21,16 @@ pub fn effects(kinds: &[String]) -> Vec<String> {
     list
 }
 
+/// A text in which effects have their public names, with these in words: `stribeck_friction` becomes `Stribeck friction`.
+pub fn in_words(text: &str) -> String {
+    let word = |word: &str| {
+        let name = word.trim_end_matches(['.', ',', ':', ';', ')']);
+        let known = name.contains('_') && Kind::ALL.into_iter().any(|kind| kind.name() == name);
+        if known { effect(name) + &word[name.len()..] } else { word.to_owned() }
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
 /// What the real robot does that the model does not, in one clause; empty for kinds outside the catalogue.
 pub fn meaning(kind: &str) -> &'static str {
     match kind {
@@ -211,26 +221,52 @@ pub fn position_unit(joint: &str, evidence: &Evidence, regimes: &[Regime]) -> &'
     if torque_unit(joint, evidence, regimes) == "N" { "m" } else { "rad" }
 }
 
+/// How the joints of an effect are told in the fewest words.
+enum Told<'a> {
+    Robot,
+    Names(&'a [String]),
+    /// Numbers at the end of names that share the text before, in runs.
+    Numbers(Vec<String>),
+    All(usize),
+    Part(&'a [String], usize),
+}
+
+fn told<'a>(names: &'a [String], all: &[String]) -> Told<'a> {
+    if names.is_empty() {
+        return Told::Robot;
+    }
+    if names.len() > 2
+        && let Some(numbers) = numbered(names, all)
+    {
+        return Told::Numbers(runs(&numbers));
+    }
+    let columns = names.iter().map(|name| name.chars().count() + 2).sum::<usize>() - 2;
+    match names.len() {
+        several if several > 1 && several == all.len() && columns > 30 => Told::All(several),
+        several if several <= 3 || columns <= 40 => Told::Names(names),
+        _ => Told::Part(names, all.len()),
+    }
+}
+
 /// Joints of an effect: names up to three, else numbers where the names are numbered, else a count.
 pub fn joints(names: &[String], all: &[String]) -> String {
-    match names {
-        [] => "whole robot".into(),
-        [one] => one.clone(),
-        several => {
-            if several.len() > 2
-                && let Some(numbers) = numbered(several, all)
-            {
-                return format!("joints {}", runs(&numbers));
-            }
-            let joined = several.join(", ");
-            if several.len() == all.len() && joined.chars().count() > 30 {
-                format!("all {} joints", all.len())
-            } else if several.len() <= 3 || joined.chars().count() <= 40 {
-                joined
-            } else {
-                format!("{} of {} joints: {}, {}, …", several.len(), all.len(), several[0], several[1])
-            }
-        }
+    match told(names, all) {
+        Told::Robot => "whole robot".into(),
+        Told::Names(names) => names.join(", "),
+        Told::Numbers(runs) => format!("joints {}", runs.join(", ")),
+        Told::All(all) => format!("all {all} joints"),
+        Told::Part(names, all) => format!("{} of {all} joints: {}, {}, …", names.len(), names[0], names[1]),
+    }
+}
+
+/// The same within a sentence: `joint2 and joint3`, `joints 1–3 and 5`.
+pub fn joints_in_a_sentence(names: &[String], all: &[String]) -> String {
+    match told(names, all) {
+        Told::Robot => "the whole robot".into(),
+        Told::Names(names) => list(names, "and"),
+        Told::Numbers(runs) => format!("joints {}", list(&runs, "and")),
+        Told::All(all) => format!("all {all} joints"),
+        Told::Part(names, all) => format!("{} of {all} joints", names.len()),
     }
 }
 
@@ -262,21 +298,18 @@ fn numbered(names: &[String], all: &[String]) -> Option<Vec<u32>> {
     names.iter().map(|name| split(name).map(|(_, number)| number)).collect()
 }
 
-/// `1–3, 5` from 1, 2, 3, 5.
-fn runs(numbers: &[u32]) -> String {
+/// `1–3` and `5` from 1, 2, 3, 5.
+fn runs(numbers: &[u32]) -> Vec<String> {
     let mut sorted = numbers.to_vec();
     sorted.sort_unstable();
     sorted.dedup();
     sorted
         .chunk_by(|a, b| a + 1 == *b)
-        .map(|run| match run {
-            [one] => one.to_string(),
-            [a, b] => format!("{a}, {b}"),
-            [a, .., b] => format!("{a}–{b}"),
-            [] => String::new(),
+        .flat_map(|run| match run {
+            [a, _, .., b] => vec![format!("{a}–{b}")],
+            few => few.iter().map(u32::to_string).collect(),
         })
-        .collect::<Vec<_>>()
-        .join(", ")
+        .collect()
 }
 
 #[cfg(test)]
@@ -296,11 +329,22 @@ mod tests {
         let named = names(&["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_joint"]);
         assert_eq!(joints(&named, &named), "all 4 joints");
         assert_eq!(joints(&[], &named), "whole robot");
+        let five: Vec<String> = [0, 1, 3, 5, 6].map(|i| all[i].clone()).to_vec();
+        assert_eq!(joints(&five, &all), "joints 1, 2, 4, 6, 7");
+        assert_eq!(joints_in_a_sentence(&five, &all), "joints 1, 2, 4, 6 and 7");
+        assert_eq!(joints_in_a_sentence(&named[..2], &named), "shoulder_pan_joint and shoulder_lift_joint");
     }
 
     #[test]
     fn an_effect_is_named_once() {
         assert_eq!(effects(&names(&["payload", "backlash", "payload"])), ["payload", "backlash"]);
+    }
+
+    #[test]
+    fn public_names_become_words_and_files_stay() {
+        assert_eq!(in_words("stribeck_friction + thermal_drift"), "Stribeck friction + thermal drift");
+        let text = "follow next_experiment.csv: torque_bias, or a rigid drive";
+        assert_eq!(in_words(text), "follow next_experiment.csv: torque bias, or a rigid drive");
     }
 
     #[test]

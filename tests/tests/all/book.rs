@@ -1,4 +1,4 @@
-//! The book and the README: every link resolves, every page is in the summary, no sentence is long.
+//! The book and the README: every link resolves, every page is in the summary, no sentence and no README is long.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 /// Words of a sentence, at most: more is not understood in one reading.
 const LONGEST: usize = 25;
+/// Lines of the README, at most: the rest is the book's.
+const README: usize = 120;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -27,6 +29,18 @@ fn pages() -> Vec<PathBuf> {
     }
     found.sort();
     assert!(found.len() > 40, "the book lost its pages: {}", found.len());
+    found
+}
+
+/// Pages that lie in `docs`: most of them a command writes.
+fn docs() -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for folder in ["docs", "docs/real", "docs/studies", "docs/withheld"] {
+        let files = fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
+        found.extend(files.filter(|file| file.extension().is_some_and(|ending| ending == "md")));
+    }
+    found.sort();
+    assert!(found.len() > 10, "the docs lost their pages: {}", found.len());
     found
 }
 
@@ -148,7 +162,7 @@ fn too_long(sentence: &[&str]) -> Option<String> {
 
 #[test]
 fn every_link_of_book_and_readme_resolves() {
-    let files = pages().into_iter().chain([root().join("README.md")]);
+    let files = pages().into_iter().chain(docs()).chain([root().join("README.md")]);
     let wrong: Vec<String> = files.flat_map(|file| broken(&file)).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
@@ -161,12 +175,48 @@ fn every_page_is_in_the_summary() {
     let missing: Vec<PathBuf> =
         pages().into_iter().filter(|page| !page.ends_with("SUMMARY.md") && !listed.contains(page)).collect();
     assert!(missing.is_empty(), "not in SUMMARY.md: {missing:?}");
+    // The book reaches `docs` by a link.
+    let in_book = |file: &PathBuf| folder.join(file.strip_prefix(root()).unwrap());
+    let missing: Vec<PathBuf> = docs().into_iter().filter(|file| !listed.contains(&in_book(file))).collect();
+    assert!(missing.is_empty(), "not in SUMMARY.md: {missing:?}");
+}
+
+#[test]
+fn the_readme_is_one_screen_and_then_some() {
+    let lines = fs::read_to_string(root().join("README.md")).unwrap().lines().count();
+    assert!(lines <= README, "{lines} lines");
+}
+
+/// What the page of an effect has, beside what is true of it alone.
+const PARTS: [&str; 5] = [
+    "Source",
+    "\n## What it looks like\n",
+    "](../pictures/",
+    "\n## How to provoke it\n",
+    "\n## What it is confused with\n",
+];
+
+#[test]
+fn every_effect_has_a_page_with_law_picture_provocation_and_confusions() {
+    let folder = root().join("book/src/effects");
+    let mut kinds: Vec<String> = gapscope_effects::Kind::ALL.iter().map(|kind| kind.name().to_owned()).collect();
+    kinds.extend(["servo_gain_error", "servo_damping_error", "speed_limit", "dead_band"].map(String::from));
+    let index = fs::read_to_string(folder.join("index.md")).unwrap();
+    for kind in kinds {
+        let page = fs::read_to_string(folder.join(format!("{kind}.md"))).unwrap();
+        for part in PARTS {
+            assert!(page.contains(part), "{kind}.md lacks {part:?}");
+        }
+        let rivals = page.split("## What it is confused with").nth(1).unwrap().lines();
+        assert!(rivals.skip(1).any(|line| line.starts_with("- ")), "{kind}.md names nothing that it is confused with");
+        assert!(index.contains(&format!("({kind}.md)")), "{kind} is not in the index");
+    }
 }
 
 #[test]
 fn no_sentence_of_the_book_is_long() {
     let mut long = Vec::new();
-    for page in pages() {
+    for page in pages().into_iter().chain([root().join("README.md")]) {
         let text = fs::read_to_string(&page).unwrap();
         long.extend(long_sentences(&text).into_iter().map(|sentence| format!("{}: {sentence}", page.display())));
     }

@@ -1,10 +1,13 @@
 //! Made-up diagnoses for the tests and for looking at the page: none comes from a robot.
 
+mod large;
 mod parts;
 
 use gapscope_diagnosis::schema::*;
 use parts::*;
 use std::collections::BTreeMap;
+
+pub use large::large;
 
 type Case = (&'static str, Diagnosis, Evidence);
 

@@ -16,8 +16,10 @@ const pick = (joint) => {
   document.querySelectorAll("[data-pick]").forEach((chip) => {
     chip.toggleAttribute("aria-current", chip.dataset.pick === picked);
   });
-  document.querySelectorAll("#skeleton .joint").forEach((group) => {
+  const labels = document.querySelectorAll("#skeleton .labels text");
+  document.querySelectorAll("#skeleton .joint").forEach((group, j) => {
     group.classList.toggle("picked", group.dataset.joint === picked);
+    labels[j].classList.toggle("picked", group.dataset.joint === picked);
     group.setAttribute("aria-pressed", String(group.dataset.joint === picked));
   });
   const note = document.getElementById("filter");

@@ -25,9 +25,11 @@ if (live && data.series.length && window.uPlot) {
     parts.push("gap " + figure(m[k] == null ? null : m[k] - n[k]) + (c.length ? " → " + figure(m[k] == null ? null : m[k] - c[k]) : "") + " " + unit);
     readout.textContent = parts.join(" · ");
   };
+  // A true minus sign, and no more digits than ticks need.
+  const signed = (_, ticks) => ticks.map((x) => x == null ? "" : String(Number(x.toPrecision(6))).replace("-", "−"));
   const options = () => {
     const ink = color("--muted"), grid = color("--grid"), font = "12px system-ui, sans-serif";
-    const axis = { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, font, labelFont: font, labelSize: 18 };
+    const axis = { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, font, labelFont: font, labelSize: 18, values: signed };
     const list = [{}, { label: "measured", stroke: color("--measured-line"), width: 2.5 }, { label: words.nominal, stroke: color("--before"), width: 1.4 }];
     if (current.c.length) list.push({ label: words.corrected, stroke: color("--after"), width: 1.4, dash: [6, 3] });
     const shade = color("--shade");
@@ -36,7 +38,7 @@ if (live && data.series.length && window.uPlot) {
       legend: { show: false }, cursor: { drag: { x: true, y: false }, focus: { prox: 24 }, sync: { key: "time" } },
       scales: { x: { time: false } }, series: list,
       bands: [{ series: [1, 2], fill: shade }, { series: [2, 1], fill: shade }],
-      axes: [{ ...axis, size: 28 }, { ...axis, label: words.what + ", " + current.unit, size: 56 }],
+      axes: [{ ...axis, size: 28 }, { ...axis, label: words.what + ", " + current.unit, size: 56, space: 24 }],
       hooks: { setCursor: [() => { say(); if (chart.cursor.idx != null) pose(current.t[chart.cursor.idx]); }], setScale: [same] },
     };
   };
@@ -45,10 +47,10 @@ if (live && data.series.length && window.uPlot) {
     const { series: lines, axes, bands: _, hooks: __, ...rest } = options();
     return {
       ...rest, height: low(), series: [{}, ...lines.slice(2).map((line, i) => ({ ...line, fill: i ? undefined : color("--shade") }))],
-      axes: [{ ...axes[0], label: "time, s", size: 46 }, { ...axes[1], label: "gap, " + current.unit }], hooks: { setScale: [same] },
+      axes: [{ ...axes[0], label: "time, s", size: 46 }, { ...axes[1], label: "gap, " + current.unit, space: 18 }], hooks: { setScale: [same] },
     };
   };
-  const tall = () => Math.max(170, Math.min(250, box.clientWidth * 0.35)), low = () => Math.max(130, Math.min(190, box.clientWidth * 0.25));
+  const tall = () => Math.max(170, Math.min(250, box.clientWidth * 0.35)), low = () => Math.max(150, Math.min(190, box.clientWidth * 0.25));
   const same = (one, key) => {
     if (key !== "x" || moving || !chart || !errors) return;
     moving = true;

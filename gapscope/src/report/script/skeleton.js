@@ -56,6 +56,10 @@ if (scene && skeleton) {
   };
   const links = skeleton.querySelectorAll(".links line");
   const groups = skeleton.querySelectorAll(".joint");
+  const numbers = skeleton.querySelectorAll(".labels text");
+  // As in skeleton.rs.
+  const BESIDE = [[0.05, -0.04], [-0.11, -0.04], [0.05, 0.1], [-0.11, 0.1], [0.18, 0.03], [-0.24, 0.03], [0.05, -0.18], [-0.11, -0.18]];
+  const APART = [0.12, 0.12];
   const floor = skeleton.querySelector(".floor");
   const ghosts = skeleton.querySelector(".ghosts");
 
@@ -66,9 +70,15 @@ if (scene && skeleton) {
     groups.forEach((group, j) => {
       const ends = [points[2 * j], points[2 * j + 1]];
       place(group.querySelector(".barrel"), ends);
-      const [x, y] = project(ends[1]), text = group.querySelector("text");
-      text.setAttribute("x", x.toFixed(3));
-      text.setAttribute("y", y.toFixed(3));
+    });
+    const placed = [];
+    numbers.forEach((text, j) => {
+      const [x, y] = project(points[2 * j + 1]), places = BESIDE.map(([dx, dy]) => [x + dx, y + dy]);
+      const free = ([x, y]) => Math.abs(y) <= 0.92 && placed.every((o) => Math.abs(x - o[0]) >= APART[0] || Math.abs(y - o[1]) >= APART[1]);
+      const place = places.find(free) ?? places[0];
+      placed.push(place);
+      text.setAttribute("x", place[0].toFixed(3));
+      text.setAttribute("y", place[1].toFixed(3));
     });
     const ring = [];
     for (let k = 0; k <= 48; k++) {
@@ -126,7 +136,9 @@ if (scene && skeleton) {
     pitch = Math.max(-1.5, Math.min(1.5, pitch + turn[1]));
     draw();
   });
-  groups.forEach((group) => {
+  groups.forEach((group, j) => {
+    ["pointerenter", "focus"].forEach((event) => group.addEventListener(event, () => numbers[j].classList.add("shown")));
+    ["pointerleave", "blur"].forEach((event) => group.addEventListener(event, () => numbers[j].classList.remove("shown")));
     group.setAttribute("tabindex", "0");
     group.setAttribute("role", "button");
     group.setAttribute("aria-label", "Show " + group.dataset.joint + " only");

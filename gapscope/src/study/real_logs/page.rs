@@ -1,10 +1,10 @@
 //! One page of documentation for one log.
 
 use super::published::{KnownFit, Log};
+use crate::report::plain::answer;
 use crate::report::{
-    NONE, Printed, answer_sentences, capital, effect, estimate, figure, implied_unit, joint_list, motion_unit,
-    outstanding, parameter, percent, percent_interval, plain, probability_figure, regime_phrase, sentence_of_the_rest,
-    with_unit,
+    NONE, Printed, capital, effect, estimate, figure, implied_unit, joint_list, motion_unit, outstanding, parameter,
+    percent, percent_interval, plain, probability_figure, regime_phrase, sentence_of_the_rest, with_unit,
 };
 use gapscope_diagnosis::Outcome;
 use gapscope_diagnosis::schema::{Change, Diagnosis, Estimate, FoundEffect, Parameter, Quantity, Series};
@@ -22,9 +22,9 @@ pub struct Other {
 /// The page; `pictures` are the files of torque over time and of what is left, where there is one.
 pub fn markdown(log: &Log, outcome: &Outcome, others: &[Other], pictures: [Option<&str>; 2]) -> String {
     let diagnosis = &outcome.diagnosis;
-    let [place, which, how_far] = answer_sentences(diagnosis, &outcome.evidence);
+    let answer = answer(diagnosis).map(|sentence| format!("> {sentence}")).join("\n>\n");
     let mut text = format!(
-        "# {}\n\n{}\n\n```\ngapscope diagnose {set}/robot.urdf {set}/{}\n```\n\n- **Verdict.** {}\n- **Where.** {place}\n- **Which.** {which}\n- **How far.** {how_far}\n\n",
+        "# {}\n\n{}\n\n```\ngapscope diagnose {set}/robot.urdf {set}/{}\n```\n\n**{}.** The answer:\n\n{answer}\n\n",
         log.title,
         log.about,
         log.log,
@@ -157,14 +157,17 @@ fn found(log: &Log, diagnosis: &Diagnosis) -> String {
 
 fn confidence(one: &FoundEffect) -> String {
     let ties: Vec<String> = one.indistinguishable_from.iter().map(|kind| effect(kind)).collect();
-    let ties =
-        if ties.is_empty() { String::new() } else { format!("; these logs cannot tell it from {}", ties.join(", ")) };
-    let interval = one.shrink.ci95.map_or(String::new(), |interval| format!(" ({})", percent_interval(interval)));
-    let alone = one
-        .shrink
-        .torque
-        .map_or(String::new(), |part| format!(", alone it shrinks the torque gap by {}{interval}", percent(part)));
-    format!("- {}: confidence {} %{alone}{ties}.\n", capital(&effect(&one.kind)), probability_figure(one.confidence))
+    let ties = if ties.is_empty() { String::new() } else { format!(" Not to be told from {}.", ties.join(", ")) };
+    let interval = |[low, high]: [f64; 2]| match low < 0.0 && high > 0.0 {
+        true => format!(" ({} less to {} more)", percent(high), percent(-low)),
+        false => format!(" ({})", percent_interval([low.abs().min(high.abs()), low.abs().max(high.abs())])),
+    };
+    let interval = one.shrink.ci95.map_or(String::new(), interval);
+    let alone = one.shrink.torque.map_or(String::new(), |part| {
+        let verb = if part < 0.0 { "grows" } else { "shrinks" };
+        format!(" Alone it {verb} the torque gap by {}{interval}.", percent(part.abs()))
+    });
+    format!("- {}: confidence {} %.{alone}{ties}\n", capital(&effect(&one.kind)), probability_figure(one.confidence))
 }
 
 fn published(log: &Log, kind: &str, parameter: &str, joint: &str) -> Option<f64> {
@@ -202,7 +205,7 @@ fn shrink(diagnosis: &Diagnosis) -> String {
     let reference = &shrink.reference;
     let _ = writeln!(
         text,
-        "\nIn the measure of the first row the noise floor is {}; a residual network on top of the nominal model leaves {}, a network alone {}.\n",
+        "\nIn the measure of the first row the noise floor is {}. A residual network on the nominal model leaves {}, a network alone {}.\n",
         figure(reference.noise_floor),
         of(reference.residual_network),
         of(reference.pure_network)

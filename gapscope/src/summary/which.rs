@@ -1,0 +1,108 @@
+//! The effects as rows of text: name, place, confidence, what each does alone, and its parameters.
+
+use super::{EFFECTS, SUMS, rest};
+use crate::report::clause::combination;
+use crate::report::plain::together;
+use crate::report::terminal::{INDENT, Paint, clean, column, name as padded};
+use crate::report::{
+    NONE, capital, effect, estimate, joint_list, percent, probability_figure, said_of, span, with_unit,
+};
+use gapscope_diagnosis::schema::{Diagnosis, Estimate, FoundEffect, Parameter, Quantity, Verdict};
+use std::collections::BTreeMap;
+
+/// The effects of a robot whose logs hold its torque.
+pub fn of(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
+    if diagnosis.effects.is_empty() {
+        let text = match diagnosis.verdict {
+            Verdict::NoGap => "none needed",
+            _ => "nothing I know: no effect of the catalogue explains this gap",
+        };
+        return vec![text.into()];
+    }
+    // Of a link alone, logs tell little.
+    let sums = |found: &FoundEffect| {
+        let links = diagnosis.effects.iter().any(|e| e.kind == found.kind && e.parameters.contains_key("mass_delta"));
+        links.then(|| {
+            let differ = diagnosis.combinations.iter().filter(|sum| sum.differs()).take(SUMS);
+            differ.map(|sum| clean(&combination(sum))).collect()
+        })
+    };
+    rows(&together(diagnosis), &diagnosis.joints, "alone", &sums, paint)
+}
+
+/// One effect a row, its parameters behind it or, where these are too wide, below. `changes` is how a shrink comes about;
+/// `instead` has what stands in the place of an effect's parameters, if anything does.
+pub fn rows(
+    effects: &[FoundEffect],
+    all: &[String],
+    changes: &str,
+    instead: &dyn Fn(&FoundEffect) -> Option<Vec<String>>,
+    paint: &Paint,
+) -> Vec<String> {
+    let shown = &effects[..effects.len().min(EFFECTS)];
+    let names: Vec<String> = shown.iter().map(|e| capital(&effect(&e.kind))).collect();
+    let places: Vec<String> = shown.iter().map(|e| joint_list(&e.joints, all)).collect();
+    let (first, second) = (column(names.iter().map(String::as_str), 28), column(places.iter().map(String::as_str), 34));
+    let mut rows = vec![];
+    for ((found, name), place) in shown.iter().zip(&names).zip(&places) {
+        let alone = match found.shrink.torque {
+            Some(s) if s < 0.0 => format!(", {changes} grows the gap by {}", percent(-s)),
+            Some(s) => format!(", {changes} shrinks the gap by {}", percent(s)),
+            None => String::new(),
+        };
+        let line = format!("{}  {:>4} % sure{alone}", padded(place, second), probability_figure(found.confidence));
+        let name = paint.bold(&padded(name, first));
+        if let Some(lines) = instead(found) {
+            rows.push(format!("{name}  {line}"));
+            rows.extend(lines.iter().map(|line| format!("  {line}")));
+            continue;
+        }
+        let details: Vec<String> =
+            found.parameters.iter().filter_map(|(name, p)| value(&found.kind, name, p)).collect();
+        let details = details.join("; ");
+        let columns = INDENT + first + 4 + line.chars().count();
+        if columns + details.chars().count() <= paint.width {
+            rows.push(format!("{name}  {line}  {details}"));
+        } else {
+            rows.push(format!("{name}  {line}"));
+            rows.push(format!("  {details}"));
+        }
+    }
+    rest(rows, effects.len(), EFFECTS, "effect")
+}
+
+/// `static friction 0.42–1.51 N m, each ± 0.04 or less`; vectors are left to the report.
+fn value(kind: &str, name: &str, found: &Parameter) -> Option<String> {
+    let text = match found {
+        Parameter::Single(single) => one(single)?,
+        Parameter::PerJoint(map) if map.len() == 1 => one(map.values().next()?)?,
+        Parameter::PerJoint(map) => format!("{}{}", span(map.values())?, widest(map)),
+    };
+    Some(said_of(kind, name, &text))
+}
+
+/// `200 ± 17 N s/m`; `None` for a vector.
+pub fn one(single: &Estimate) -> Option<String> {
+    let printed = estimate(single);
+    let [half] = printed.half_width.as_slice() else {
+        return None;
+    };
+    let text = match half.as_str() {
+        "0" | NONE => printed.value.clone(),
+        half => format!("{} ± {half}", printed.value),
+    };
+    Some(with_unit(&text, &printed.unit))
+}
+
+/// The widest half interval over the joints.
+fn widest(map: &BTreeMap<String, Estimate>) -> String {
+    let half = |e: &Estimate| match (&e.ci95[0], &e.ci95[1]) {
+        (Quantity::Scalar(a), Quantity::Scalar(b)) => (b - a) / 2.0,
+        _ => f64::NAN,
+    };
+    let widest = map.values().filter(|e| half(e).is_finite()).max_by(|a, b| half(a).total_cmp(&half(b)));
+    widest.map(estimate).map_or(String::new(), |p| match p.half_width.as_slice() {
+        [half] => format!(", ± {half} or less"),
+        _ => String::new(),
+    })
+}

@@ -4,9 +4,11 @@
 //! made of. So a law stands here once more, in C, and a test holds the two together to rounding.
 
 mod carry;
+mod fmu;
 mod weights;
 
 pub use carry::carry;
+pub use fmu::{Fmu, fmu};
 pub use weights::weights;
 
 use crate::number::number;
@@ -16,6 +18,10 @@ use glam::{DMat3, DVec3};
 use std::fmt::{Display, Write};
 
 const HEAD: &str = include_str!("c/head.h");
+/// A class of C++ over the C file.
+pub const CPP: &str = include_str!("c/robot.hpp");
+/// A Simulink S-function over the C file.
+pub const SIMULINK: &str = include_str!("c/robot_sfun.c");
 const CODE: [&str; 4] =
     [include_str!("c/body.c"), include_str!("c/step.c"), include_str!("c/sample.c"), include_str!("c/residual.c")];
 

@@ -15,8 +15,9 @@ mod paste;
 mod ranges;
 mod totals;
 mod urdf;
+mod xml;
 
-pub use c::weights;
+pub use c::{Fmu, fmu, weights};
 pub use carry::{Carried, How, Usual};
 pub use ledger::{Entry, LEDGER_SCHEMA, Ledger, TargetLedger};
 pub use mjcf::motor_joint;
@@ -40,9 +41,19 @@ pub enum Target {
     IsaacLab,
     /// A C file that steps the robot.
     C,
+    /// A class of C++ over that file, which it needs beside it.
+    Cpp,
+    /// A Simulink S-function over that file, which it needs beside it.
+    Simulink,
+    /// A co-simulation unit (FMI 2.0) of that file.
+    Fmu,
 }
 
 impl Target {
+    /// All of them.
+    pub const ALL: [Target; 7] =
+        [Target::Urdf, Target::Mjcf, Target::IsaacLab, Target::C, Target::Cpp, Target::Simulink, Target::Fmu];
+
     /// Name on the command line and in the ledger.
     pub fn name(self) -> &'static str {
         match self {
@@ -50,6 +61,9 @@ impl Target {
             Target::Mjcf => "mjcf",
             Target::IsaacLab => "isaaclab",
             Target::C => "c",
+            Target::Cpp => "cpp",
+            Target::Simulink => "simulink",
+            Target::Fmu => "fmu",
         }
     }
 
@@ -60,6 +74,23 @@ impl Target {
             Target::Mjcf => "robot.xml",
             Target::IsaacLab => "isaaclab_robot.py",
             Target::C => "robot.c",
+            Target::Cpp => "robot.hpp",
+            Target::Simulink => "robot_sfun.c",
+            Target::Fmu => "robot.fmu",
+        }
+    }
+
+    /// Whether the robot there is the C file.
+    pub fn is_c(self) -> bool {
+        matches!(self, Target::C | Target::Cpp | Target::Simulink | Target::Fmu)
+    }
+
+    /// The target that must stand beside it.
+    pub fn needs(self) -> Option<Target> {
+        match self {
+            Target::IsaacLab => Some(Target::Urdf),
+            Target::Cpp | Target::Simulink => Some(Target::C),
+            Target::Urdf | Target::Mjcf | Target::C | Target::Fmu => None,
         }
     }
 }
@@ -85,7 +116,7 @@ pub const DT: f64 = 1e-3;
 pub struct Exported {
     /// The target.
     pub target: Target,
-    /// Text of the file.
+    /// Text of the file; of an FMU the C code in it, which [`fmu()`] packs.
     pub text: String,
     /// What became of the effects.
     pub ledger: TargetLedger,
@@ -127,7 +158,7 @@ pub fn export(target: Target, robot: &Robot, corrected: &Corrected, logs: &[Epis
             Target::Urdf => urdf::carry(effect, &context, |joint| urdf::has_limit(robot, joint)),
             Target::Mjcf => mjcf::carry(effect, &context),
             Target::IsaacLab => isaaclab::carry(effect, &context, |joint| urdf::has_limit(robot, joint)),
-            Target::C => vec![c::carry(effect)],
+            Target::C | Target::Cpp | Target::Simulink | Target::Fmu => vec![c::carry(effect)],
         })
         .collect();
     let held = held(&carried);
@@ -141,7 +172,9 @@ pub fn export(target: Target, robot: &Robot, corrected: &Corrected, logs: &[Epis
         }
         Target::Mjcf => mjcf::write(model, &totals, &held),
         Target::IsaacLab => isaaclab::write(model, &totals, &corrected.effects),
-        Target::C => {
+        Target::Cpp => c::CPP.to_owned(),
+        Target::Simulink => c::SIMULINK.to_owned(),
+        Target::C | Target::Fmu => {
             let plant = Corrected { effects: held, ..corrected.clone() }.plant(model, robot.dt)?;
             let of = |joint: &gapscope_dynamics::Joint| corrected.standstill.get(&joint.name).copied().unwrap_or(0.0);
             c::write(&plant, &model.joints().iter().map(of).collect::<Vec<_>>())
@@ -244,9 +277,12 @@ fn notes(target: Target, dt: f64, corrected: &Corrected, totals: &Totals) -> Vec
             notes.push(format!("the encoder of `{joint}` shows the position of joint `{shown}` of the file"));
         }
     }
-    if target == Target::C {
+    if target.is_c() {
         notes.push(format!("a step is {dt} s, as --dt says; hold commands over it"));
         notes.push("limits of position, speed and effort in the robot description are not carried over".to_owned());
+    }
+    if target == Target::Simulink {
+        notes.push("not run in Simulink: MATLAB is not where the project is tested".to_owned());
     }
     if target == Target::IsaacLab {
         notes.push("not run here: Isaac Sim is not where the project is tested".to_owned());

@@ -7,6 +7,7 @@ pub use carry::carry;
 
 use crate::number::{number, numbers, vector};
 use crate::totals::Totals;
+use crate::xml::attribute;
 use gapscope_dynamics::{Inertia, Joint, JointKind, Model, Placement};
 use gapscope_effects::{Effect, Transmission};
 use glam::{DMat3, DQuat, DVec3};
@@ -80,7 +81,7 @@ impl Writer<'_> {
     }
 
     fn set(&mut self, name: &str, value: &str) {
-        self.xml.write_attribute(name, value);
+        self.xml.write_attribute(name, &attribute(value));
     }
 
     /// Sets what is not its default.

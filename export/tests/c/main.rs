@@ -1,6 +1,8 @@
 //! The C file compiled by the C compiler of this machine, held to our own plant; said to be skipped where there is none.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
+mod covers;
+
 use gapscope_diagnosis::{Corrected, EncoderSide, MODEL_SCHEMA};
 use gapscope_dynamics::{Loaded, Model, StepModel, robots};
 use gapscope_effects::{Effect, Kind};
@@ -63,28 +65,38 @@ fn corrected(model: &Model, effects: Vec<Effect>, encoder_side: EncoderSide) -> 
     }
 }
 
-fn has_compiler() -> bool {
-    let there = Command::new("cc").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
+fn has(compiler: &str) -> bool {
+    let there = Command::new(compiler).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
     if !there {
-        // The harness shows this with --nocapture; a machine without cc proves nothing of the C file.
-        eprintln!("skipped: no `cc` on this machine");
+        // The harness shows this with --nocapture; a machine without a compiler proves nothing of these files.
+        eprintln!("skipped: no `{compiler}` on this machine");
     }
     there
 }
 
+fn has_compiler() -> bool {
+    has("cc")
+}
+
+/// Runs a compiler on files of a folder, every warning an error.
+fn compile(folder: &Path, compiler: &str, arguments: &[&str]) {
+    let strict = ["-O0", "-Wall", "-Wextra", "-Werror", "-pedantic"];
+    let built = Command::new(compiler).args(strict).args(arguments).current_dir(folder).output().unwrap();
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+}
+
 /// What the compiled file says of commands, a line of numbers each.
 fn run(folder: &Path, code: &str, commands: &str) -> Vec<Vec<f64>> {
-    for (name, text) in [("robot.c", code), ("driver.c", DRIVER), ("commands", commands)] {
+    for (name, text) in [("robot.c", code), ("driver.c", DRIVER)] {
         std::fs::write(folder.join(name), text).unwrap();
     }
-    let strict = ["-std=c99", "-O0", "-Wall", "-Wextra", "-Werror", "-pedantic"];
-    let built = Command::new("cc")
-        .args(strict)
-        .args(["robot.c", "driver.c", "-lm", "-o", "robot"])
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    compile(folder, "cc", &["-std=c99", "robot.c", "driver.c", "-lm", "-o", "robot"]);
+    answers(folder, commands)
+}
+
+/// What the program `robot` of a folder says of commands.
+fn answers(folder: &Path, commands: &str) -> Vec<Vec<f64>> {
+    std::fs::write(folder.join("commands"), commands).unwrap();
     let commands = std::fs::File::open(folder.join("commands")).unwrap();
     let told = Command::new(folder.join("robot")).current_dir(folder).stdin(commands).output().unwrap();
     assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
@@ -110,7 +122,7 @@ fn same(rust: &[f64], c: &[f64], what: &str) {
 
 /// Robots: six joints, two, and a branched tree with a slide and a joint that is not about an axis of its frame.
 fn robots() -> Vec<(String, Loaded)> {
-    let branched = include_str!("../../dynamics/golden/branched.urdf");
+    let branched = include_str!("../../../dynamics/golden/branched.urdf");
     [robots::arm6(), robots::double_pendulum(), branched]
         .map(|xml| (xml.to_owned(), Model::from_urdf(xml).unwrap()))
         .to_vec()

@@ -139,7 +139,9 @@ pub(crate) fn any_fault(kinds: &[FaultKind], model: &Model, logs: usize, random:
 /// none is left. Gravity is not the logs': it is in the model that they are held against.
 pub fn spoil(fault: &mut SealedFault, model: &Model, logs: &mut [Episode], random: &mut impl Rng) -> bool {
     let index = |name: &String| model.joints().iter().position(|joint| joint.name == *name);
-    fault.joints.retain(|name| index(name).is_some_and(|j| shows(fault.kind, fault.factor, model, logs, j)));
+    // Of one log that is wrong, the others show nothing.
+    let wrong = fault.log.map_or(&logs[..], |log| std::slice::from_ref(&logs[log]));
+    fault.joints.retain(|name| index(name).is_some_and(|j| shows(fault.kind, fault.factor, model, wrong, j)));
     let joints: Vec<usize> = fault.joints.iter().filter_map(index).collect();
     if joints.is_empty()
         && !matches!(fault.kind, FaultKind::TimeScale | FaultKind::RepeatedSamples | FaultKind::Gravity)
@@ -160,12 +162,18 @@ pub fn spoil(fault: &mut SealedFault, model: &Model, logs: &mut [Episode], rando
 
 /// Whether a fault shows at a joint: its logs have what the fault changes.
 fn shows(kind: FaultKind, factor: Option<f64>, model: &Model, logs: &[Episode], j: usize) -> bool {
-    let all = || logs.iter().flat_map(|log| log.effort[j].iter().copied());
-    let most = all().fold(0.0, |most: f64, x| most.max(x.abs()));
-    let share = |is: &dyn Fn(f64) -> bool| all().filter(|x| is(*x)).count() as f64 / all().count().max(1) as f64;
+    let most = |log: &Episode| log.effort[j].iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    // Part of the samples, in the log that has the fewest: the size of the effort is each log's own.
+    let share = |is: &dyn Fn(f64) -> bool| {
+        let of = |log: &Episode| {
+            let most = most(log);
+            log.effort[j].iter().filter(|x| is(*x / most)).count() as f64 / log.len().max(1) as f64
+        };
+        logs.iter().map(of).fold(1.0, f64::min)
+    };
     match kind {
-        FaultKind::EffortAbsolute => share(&|x| x < -0.05 * most).min(share(&|x| x > 0.05 * most)) > BOTH_WAYS,
-        FaultKind::EffortClipped => share(&|x| x.abs() > CLIPPED * most) > BOTH_WAYS,
+        FaultKind::EffortAbsolute => share(&|x| x < -0.05).min(share(&|x| x > 0.05)) > BOTH_WAYS,
+        FaultKind::EffortClipped => share(&|x| x.abs() > CLIPPED) > BOTH_WAYS,
         FaultKind::PositionZero => turns_weight(model, logs, j, factor.unwrap_or(0.0)),
         FaultKind::VelocityScale => logs.iter().all(|log| log.velocity.is_some()),
         FaultKind::PositionIsCommand => logs.iter().all(|log| log.command.is_some()),

@@ -11,6 +11,15 @@ pub(crate) const GAINS: (f64, f64) = (0.67, 1.5);
 /// A gain between these is as logged at first sight.
 const PLAIN: (f64, f64) = (0.6, 1.7);
 
+/// Dry friction of the wrong sign explains at least this part of what the model leaves of the effort, squared.
+const DRIVES: f64 = 0.5;
+
+/// An effort without its sign turns at zero, this part of its size, again and again: it comes from this part so many times. One
+/// that keeps its sign because of a weight turns at zero by chance alone.
+const ZERO: f64 = 0.02;
+const UP: f64 = 0.2;
+const TURNS: usize = 6;
+
 /// Why the effort of a joint cannot be used.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Useless {
@@ -84,7 +93,8 @@ pub(crate) fn is_passive(model: &Model, sample: &Sample, j: usize) -> bool {
 /// only in size. Beside one of which that is clear, the first two are enough.
 pub(crate) fn absolute_joints(logs: &Logs, sample: &Sample, torque: &[Vec<f64>], joints: &[usize]) -> Vec<usize> {
     let folded: Vec<usize> = joints.iter().copied().filter(|j| is_folded(logs, *j)).collect();
-    if folded.iter().any(|j| is_absolute(sample, torque, *j)) { folded } else { Vec::new() }
+    let told = |j: &usize| is_absolute(sample, torque, *j) || turns_at_zero(logs, *j) >= TURNS;
+    if folded.iter().any(told) { folded } else { Vec::new() }
 }
 
 /// Whether a joint's effort is never negative, or never positive, and down to zero again and again, while the joint reverses.
@@ -95,6 +105,22 @@ fn is_folded(logs: &Logs, j: usize) -> bool {
     let one_sided = low >= -1e-3 * size || high <= 1e-3 * size;
     let near_zero = all().filter(|x| x.abs() < 0.04 * size).count() as f64 > 0.005 * all().count() as f64;
     one_sided && near_zero && size > 0.0
+}
+
+/// How often a joint's effort comes down to zero and goes up again.
+fn turns_at_zero(logs: &Logs, j: usize) -> usize {
+    let of = |effort: &Vec<f64>| {
+        let size = effort.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let (mut up, mut turns) = (false, 0);
+        for x in effort.iter().map(|x| x.abs()) {
+            if up && x < ZERO * size {
+                (up, turns) = (false, turns + 1);
+            }
+            up |= x > UP * size;
+        }
+        turns
+    };
+    logs.episodes.iter().map(|episode| of(&episode.effort[j])).sum()
 }
 
 fn is_absolute(sample: &Sample, torque: &[Vec<f64>], j: usize) -> bool {
@@ -116,27 +142,19 @@ pub(crate) fn explained(sample: &Sample, torque: &[Vec<f64>], j: usize) -> Optio
     fit(&sample.effort[j], &torque[j], &sample.v[j], None)
 }
 
-/// Part of a joint's samples that lie on its greatest or least effort to the bit, in runs: where, and how many.
-pub(crate) fn cut_off(logs: &Logs, j: usize) -> Option<(f64, f64)> {
-    let all = || logs.episodes.iter().map(|episode| &episode.effort[j]);
-    let count: usize = all().map(Vec::len).sum();
-    let high = all().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
-    let low = all().flatten().copied().fold(f64::INFINITY, f64::min);
-    let at = |end: f64| all().flat_map(|row| row.windows(3)).filter(|run| run.iter().all(|x| *x == end)).count();
-    [(high, at(high)), (low, at(low))]
-        .into_iter()
-        .filter(|(end, times)| *end != 0.0 && *times as f64 > 0.02 * count as f64)
-        .map(|(end, times)| (end, times as f64 / count.max(1) as f64))
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-}
-
-/// Where the effort lies at its end, how far an account takes it beyond, relative: what a log cut off, the motion still shows.
-pub(crate) fn beyond_the_end(sample: &Sample, predicted: &[f64], j: usize, end: f64) -> f64 {
-    let at: Vec<f64> = (0..sample.len())
-        .filter(|&k| (sample.effort[j][k] - end).abs() < 1e-6 * end.abs())
-        .map(|k| predicted[k] / end - 1.0)
-        .collect();
-    if at.len() < 5 { 0.0 } else { at.iter().sum::<f64>() / at.len() as f64 }
+/// Whether most of what a joint's effort holds beside the model's torque goes with the motion, as friction would that gave
+/// energy instead of taking it: then the effort, or the position, is counted the other way round.
+pub(crate) fn friction_drives(sample: &Sample, torque: &[Vec<f64>], j: usize) -> bool {
+    let slow = 0.1 * rms(&sample.v[j]);
+    let mut left: Vec<f64> = sample.effort[j].iter().zip(&torque[j]).map(|(effort, torque)| effort - torque).collect();
+    let mut dry: Vec<f64> = sample.v[j].iter().map(|v| (v / slow.max(1e-12)).tanh()).collect();
+    for row in [&mut left, &mut dry] {
+        let mean = row.iter().sum::<f64>() / row.len().max(1) as f64;
+        row.iter_mut().for_each(|x| *x -= mean);
+    }
+    let with = left.iter().zip(&dry).map(|(x, y)| x * y).sum::<f64>();
+    let [left, dry] = [left, dry].map(|row| row.iter().map(|x| x * x).sum::<f64>());
+    with < 0.0 && with * with > DRIVES * left * dry
 }
 
 /// What each joint's effort was multiplied by, at first sight: 1 where nothing speaks against it.
@@ -147,6 +165,7 @@ pub(crate) fn first_scales(model: &Model, sample: &Sample, active: &[bool]) -> V
         found
             .filter(|fit| fit.correlation.abs() > 0.5 && fit.weight * fit.gain.abs() > 0.05)
             .map(|fit| if (PLAIN.0..PLAIN.1).contains(&fit.gain) { 1.0 } else { fit.gain })
+            .or_else(|| (active[j] && friction_drives(sample, &torque, j)).then_some(-1.0))
     };
     let told: Vec<Option<f64>> = (0..model.dof()).map(scale).collect();
     if let Some(one) = common(&told, active) {

@@ -6,6 +6,7 @@
 
 mod change;
 mod channels;
+mod clipped;
 mod decide;
 mod determined;
 mod effort;

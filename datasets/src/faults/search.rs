@@ -2,10 +2,10 @@
 
 use super::change::Change;
 use super::decide::{Decision, SURE, left};
-use super::effort::{self, Useless};
+use super::effort::{self, GAINS, Useless};
 use super::sample::Sample;
 use super::shift::Bar;
-use super::weigh::{Freedom, Weighed, weigh};
+use super::weigh::{Freedom, OWN, Weighed, weigh};
 use super::words::per_cent;
 use super::{Doubt, Fault, FaultKind, Faults, channels, figure, odd};
 use crate::check::{Logs, Seen};
@@ -24,6 +24,8 @@ const SETTLED: f64 = 0.1;
 /// A robot whose mass is outside of these parts of the described one may be another, or be logged in other units: its links are
 /// off by a third at most, and it carries no more than that.
 const MASS: (f64, f64) = (0.62, 1.6);
+/// Logs tell nothing of a gain of which they leave this part of the spread that used robots have.
+const UNTOLD: f64 = 0.9;
 /// At most so many things are wrong with the motion.
 const ROUNDS: usize = 6;
 /// The logs while faults are taken out of them.
@@ -286,6 +288,7 @@ impl Search {
         let Some((weighed, left)) = self.badly_described() else { return };
         let mass = weighed.mass;
         let strong = self.with_logs(strong);
+        let unwitnessed = self.with_logs(|logs| unwitnessed(&weighed, &Self::active(logs)));
         let question = if left > STRANGE {
             format!(
                 "are these the logs of this robot? Whatever its bodies and friction, {} of the effort, squared, is left",
@@ -295,6 +298,12 @@ impl Search {
             format!(
                 "are effort, position and time in N m (N), rad (m) and s? They ask for a robot of {} times the mass that the description has",
                 figure(mass)
+            )
+        } else if let Some((j, times)) = unwitnessed {
+            let joint = &self.model.joints()[j].name;
+            format!(
+                "is the effort of {joint} in N m (N)? It is {} times what the description takes, and nothing in the motion tells a scale from a rotor or another body",
+                figure(times)
             )
         } else if let Some((j, times)) = strong {
             let joint = &self.model.joints()[j].name;
@@ -330,10 +339,24 @@ impl Search {
             }
             super::shift::shift(logs, logs.model, &sample, &active, bar)
         });
-        if let Some(fault) = found {
-            self.take(fault);
+        match found {
+            Some(Ok(fault)) => self.take(fault),
+            // Where something is asked already, a shift may be what that does.
+            Some(Err(doubt)) if self.doubts.is_empty() => self.doubts.push(doubt),
+            _ => {}
         }
     }
+}
+
+/// The joint of whose scale nothing tells, and that asks for another one than an effect could have; how many times the
+/// effort it is that the description takes.
+///
+/// Gravity, and an inertia that changes with the posture, tell a scale. On a level slide a body, a rotor and a scale are one.
+fn unwitnessed(weighed: &Weighed, active: &[bool]) -> Option<(usize, f64)> {
+    let gain = |j: usize| weighed.narrowed[weighed.narrowed.len() - OWN * (active.len() - j) + OWN - 1];
+    let off = |&(_, times): &(usize, f64)| !(GAINS.0..GAINS.1).contains(&times);
+    let untold = (0..active.len()).filter(|&j| active[j] && gain(j) > UNTOLD).map(|j| (j, weighed.inertia[j]));
+    untold.filter(off).max_by(|a, b| a.1.ln().abs().total_cmp(&b.1.ln().abs()))
 }
 
 /// The joint whose effort passes the limit of its drive most, and how many times, where no drive does that.

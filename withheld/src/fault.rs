@@ -149,12 +149,14 @@ pub fn spoil(fault: &mut SealedFault, model: &Model, logs: &mut [Episode], rando
         return false;
     }
     let bare = random.random_bool(NO_VELOCITY) && fault.kind != FaultKind::VelocityScale;
+    // In half of the cases an exchanged joint is another in every channel, in all logs alike.
+    let every_channel = random.random_bool(0.5);
     for (e, log) in logs.iter_mut().enumerate() {
         if bare {
             log.velocity = None;
         }
         if fault.log.is_none_or(|only| only == e) {
-            spoil_log(fault, &joints, log, random);
+            spoil_log(fault, &joints, every_channel, log, random);
         }
     }
     true
@@ -205,7 +207,7 @@ fn turns_weight(model: &Model, logs: &[Episode], j: usize, zero: f64) -> bool {
     (0..n).any(|i| change[i] > TURNED * variance(effort[i]))
 }
 
-fn spoil_log(fault: &SealedFault, joints: &[usize], log: &mut Episode, random: &mut impl Rng) {
+fn spoil_log(fault: &SealedFault, joints: &[usize], every_channel: bool, log: &mut Episode, random: &mut impl Rng) {
     use FaultKind as K;
     let factor = fault.factor.unwrap_or(1.0);
     let times = |row: &mut Vec<f64>, factor: f64| row.iter_mut().for_each(|x| *x *= factor);
@@ -259,8 +261,7 @@ fn spoil_log(fault: &SealedFault, joints: &[usize], log: &mut Episode, random: &
         }
         (K::JointOrder, &[a, b]) => {
             log.effort.swap(a, b);
-            // In half of the cases the joint is another in every channel.
-            if random.random_bool(0.5) {
+            if every_channel {
                 log.position.swap(a, b);
                 let others = [&mut log.velocity, &mut log.command, &mut log.effort_link, &mut log.temperature];
                 others.into_iter().flatten().for_each(|samples| samples.swap(a, b));

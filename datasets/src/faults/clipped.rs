@@ -17,6 +17,8 @@ const PART: f64 = 0.1;
 const CUT: f64 = 0.08;
 /// ... and by this many standard errors: neighbouring places share half of their tents.
 const CLEAR: f64 = 6.0;
+/// Beside a joint of which that is clear in the same log, this part beyond is enough.
+const BESIDE: f64 = 0.03;
 /// Fewer places tell nothing.
 const FEWEST: usize = 4;
 /// Rounds of fitting to what was cut off as the last round has it.
@@ -59,8 +61,7 @@ pub(crate) fn clipped(logs: &Logs, model: &Model, sample: &Sample, scales: &[f64
             }
         }
     }
-    let mut found: BTreeMap<usize, Vec<(&End, f64)>> = BTreeMap::new();
-    for end in &ends {
+    let told = |end: &End| {
         let j = end.joint;
         let at_an_end = |k: usize| ends.iter().any(|other| other.joint == j && other.places.iter().any(|p| p.0 == k));
         let left: Vec<f64> =
@@ -68,8 +69,15 @@ pub(crate) fn clipped(logs: &Logs, model: &Model, sample: &Sample, scales: &[f64
         let further: f64 = end.places.iter().map(|&(k, _, sign)| sign * (predicted[j][k] - sample.effort[j][k])).sum();
         let part: f64 = end.places.iter().map(|place| place.1).sum();
         let beyond = further / (part * end.size);
-        if beyond > CUT && further > CLEAR * rms(&left) * (end.places.len() as f64).sqrt() {
-            found.entry(j).or_default().push((end, beyond));
+        (beyond, beyond > CUT && further > CLEAR * rms(&left) * (end.places.len() as f64).sqrt())
+    };
+    let told: Vec<(f64, bool)> = ends.iter().map(told).collect();
+    let mut found: BTreeMap<usize, Vec<(&End, f64)>> = BTreeMap::new();
+    for (end, (beyond, clear)) in ends.iter().zip(&told) {
+        // A log that cuts one joint's effort off may do so with all: beside a clear one, less is enough.
+        let beside = ends.iter().zip(&told).any(|(other, (_, clear))| *clear && other.log == end.log);
+        if *clear || (beside && *beyond > BESIDE) {
+            found.entry(end.joint).or_default().push((end, *beyond));
         }
     }
     let fault = |(j, ends): (usize, Vec<(&End, f64)>)| {

@@ -89,38 +89,46 @@ pub(crate) fn is_passive(model: &Model, sample: &Sample, j: usize) -> bool {
     rms(&torque[j]) < 0.25 * rms(&weight[j]).max(rms(&inertia))
 }
 
-/// Which of some joints have efforts that lost their sign: never negative, down to zero again and again, and like the model's
-/// only in size. Beside one of which that is clear, the first two are enough.
-pub(crate) fn absolute_joints(logs: &Logs, sample: &Sample, torque: &[Vec<f64>], joints: &[usize]) -> Vec<usize> {
-    let folded: Vec<usize> = joints.iter().copied().filter(|j| is_folded(logs, *j)).collect();
-    let told = |j: &usize| is_absolute(sample, torque, *j) || turns_at_zero(logs, *j) >= TURNS;
-    if folded.iter().any(told) { folded } else { Vec::new() }
+/// Which of some joints have efforts that lost their sign in one log: never negative, down to zero again and again, and like the
+/// model's only in size. Beside one of which that is clear, the first two are enough.
+pub(crate) fn absolute_joints(
+    logs: &Logs,
+    sample: &Sample,
+    e: usize,
+    joints: &[usize],
+) -> impl Iterator<Item = usize> + use<> {
+    let folded: Vec<usize> = joints.iter().copied().filter(|j| is_folded(&logs.episodes[e].effort[*j])).collect();
+    let clear = |folded: &[usize]| {
+        let sample = sample.only(e);
+        let torque = sample.torque(logs.model);
+        let turns = |j: usize| turns_at_zero(&logs.episodes[e].effort[j]) >= TURNS;
+        folded.iter().any(|&j| turns(j) || is_absolute(&sample, &torque, j))
+    };
+    let any = !folded.is_empty() && clear(&folded);
+    folded.into_iter().filter(move |_| any)
 }
 
-/// Whether a joint's effort is never negative, or never positive, and down to zero again and again, while the joint reverses.
-fn is_folded(logs: &Logs, j: usize) -> bool {
-    let all = || logs.episodes.iter().flat_map(|episode| episode.effort[j].iter().copied());
-    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+/// Whether an effort is never negative, or never positive, and down to zero again and again.
+fn is_folded(effort: &[f64]) -> bool {
+    let (low, high) =
+        effort.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
     let size = high.abs().max(low.abs());
     let one_sided = low >= -1e-3 * size || high <= 1e-3 * size;
-    let near_zero = all().filter(|x| x.abs() < 0.04 * size).count() as f64 > 0.005 * all().count() as f64;
+    let near_zero = effort.iter().filter(|x| x.abs() < 0.04 * size).count() as f64 > 0.005 * effort.len() as f64;
     one_sided && near_zero && size > 0.0
 }
 
-/// How often a joint's effort comes down to zero and goes up again.
-fn turns_at_zero(logs: &Logs, j: usize) -> usize {
-    let of = |effort: &Vec<f64>| {
-        let size = effort.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let (mut up, mut turns) = (false, 0);
-        for x in effort.iter().map(|x| x.abs()) {
-            if up && x < ZERO * size {
-                (up, turns) = (false, turns + 1);
-            }
-            up |= x > UP * size;
+/// How often an effort comes down to zero and goes up again.
+fn turns_at_zero(effort: &[f64]) -> usize {
+    let size = effort.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let (mut up, mut turns) = (false, 0);
+    for x in effort.iter().map(|x| x.abs()) {
+        if up && x < ZERO * size {
+            (up, turns) = (false, turns + 1);
         }
-        turns
-    };
-    logs.episodes.iter().map(|episode| of(&episode.effort[j])).sum()
+        up |= x > UP * size;
+    }
+    turns
 }
 
 fn is_absolute(sample: &Sample, torque: &[Vec<f64>], j: usize) -> bool {
@@ -210,7 +218,8 @@ pub(crate) fn fine_scales(
     let one = (0..n).filter(|&j| active[j]).all(|j| scales[j] == scales[(0..n).find(|&i| active[i]).unwrap_or(0)]);
     let mut weighed = weigh(model, sample, &scales, active, Freedom::ORDINARY);
     for _ in 0..4 {
-        let scaled: Vec<usize> = (0..n).filter(|&j| active[j] && scales[j] != 1.0).collect();
+        // A sign is a sign.
+        let scaled: Vec<usize> = (0..n).filter(|&j| active[j] && scales[j].abs() != 1.0).collect();
         if scaled.is_empty() {
             break;
         }

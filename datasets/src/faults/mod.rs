@@ -20,6 +20,7 @@ mod scale;
 mod search;
 mod sharpen;
 mod shift;
+mod strange;
 mod units;
 mod weigh;
 mod words;

@@ -88,7 +88,7 @@ pub(crate) fn scales(
         let explains = after < 0.45 && (after < less * before || bent);
         if margin > if alone { 2.0 * SURE } else { SURE } && explains {
             taken.clone_from(&scales);
-            found.extend(said(logs, &scales, &best, &plain));
+            found.extend(said(logs, &scales, &best, &plain, (sample, &torque)));
         } else if margin > 0.5 * SURE && cost > 0.0 && explains && !alone {
             let joints: Vec<String> =
                 (0..n).filter(|&j| scales[j] != 1.0).map(|j| model.joints()[j].name.clone()).collect();
@@ -113,6 +113,7 @@ fn said(
     scales: &[f64],
     best: &super::weigh::Weighed,
     plain: &super::weigh::Weighed,
+    (sample, torque): (&Sample, &[Vec<f64>]),
 ) -> Vec<Result<Fault, Doubt>> {
     let n = scales.len();
     let mut left: Vec<usize> = (0..n).filter(|&j| scales[j] != 1.0).collect();
@@ -154,6 +155,10 @@ fn said(
             continue;
         }
         let what = match &unit {
+            _ if turned && friction_drives(sample, torque, group[0]) => {
+                "goes with the motion where friction goes against it: it, or the position, has the opposite sign"
+                    .to_owned()
+            }
             _ if turned => "has the opposite sign to the model's torque".to_owned(),
             Some((name, factor)) => format!("is in {name}: {} times N m (N)", figure(*factor)),
             None => format!(

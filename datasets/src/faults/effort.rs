@@ -14,6 +14,9 @@ const PLAIN: (f64, f64) = (0.6, 1.7);
 /// Dry friction of the wrong sign explains at least this part of what the model leaves of the effort, squared.
 const DRIVES: f64 = 0.5;
 
+/// A rotor may take up to so many times the torque that the description does.
+const ROTOR: f64 = 6.0;
+
 /// An effort without its sign turns at zero, this part of its size, again and again: it comes from this part so many times. One
 /// that keeps its sign because of a weight turns at zero by chance alone.
 const ZERO: f64 = 0.02;
@@ -170,10 +173,12 @@ pub(crate) fn first_scales(model: &Model, sample: &Sample, active: &[bool]) -> V
     let torque = sample.torque(model);
     let scale = |j: usize| {
         let found = explained(sample, &torque, j).filter(|_| active[j]);
-        found
+        let told = found
             .filter(|fit| fit.correlation.abs() > 0.5 && fit.weight * fit.gain.abs() > 0.05)
-            .map(|fit| if (PLAIN.0..PLAIN.1).contains(&fit.gain) { 1.0 } else { fit.gain })
-            .or_else(|| (active[j] && friction_drives(sample, &torque, j)).then_some(-1.0))
+            .map(|fit| if (PLAIN.0..PLAIN.1).contains(&fit.gain) { 1.0 } else { fit.gain });
+        // A rotor that the description lacks makes a gain of some size: the sign is what friction tells.
+        let size_is_told = told.is_some_and(|gain: f64| gain > 0.0 || !(ROTOR.recip()..ROTOR).contains(&-gain));
+        if !size_is_told && active[j] && friction_drives(sample, &torque, j) { Some(-1.0) } else { told }
     };
     let told: Vec<Option<f64>> = (0..model.dof()).map(scale).collect();
     if let Some(one) = common(&told, active) {
@@ -259,4 +264,38 @@ pub(crate) fn effort_unit(scale: f64, error: f64, limit: Option<f64>) -> Option<
     // Of two that fit, neither is known.
     let [one] = fitting.as_slice() else { return None };
     Some(one.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn friction_gives_no_energy() {
+        let v: Vec<f64> = (0..200).map(|k| (0.1 * f64::from(k)).sin()).collect();
+        let torque = vec![v.iter().map(|v| 0.2 * v * v).collect::<Vec<f64>>()];
+        let driven = |size: f64| {
+            let effort = v.iter().zip(&torque[0]).map(|(v, torque)| torque + size * v.signum() - 0.3).collect();
+            let zero = || vec![vec![0.0; v.len()]];
+            let sample = Sample {
+                q: zero(),
+                v: vec![v.clone()],
+                a: zero(),
+                effort: vec![effort],
+                log: vec![0; v.len()],
+                tents: vec![[0.0; 3]; v.len()],
+            };
+            friction_drives(&sample, &torque, 0)
+        };
+        assert!(!driven(1.0) && driven(-1.0));
+    }
+
+    #[test]
+    fn an_effort_without_its_sign_turns_at_zero() {
+        let wave = |k: i32| (0.05 * f64::from(k)).sin();
+        let folded: Vec<f64> = (0..1000).map(|k| wave(k).abs()).collect();
+        let lifted: Vec<f64> = (0..1000).map(|k| 1.05 + wave(k)).collect();
+        assert!(is_folded(&folded) && turns_at_zero(&folded) >= TURNS);
+        assert!(turns_at_zero(&lifted) == 0 && !is_folded(&(0..1000).map(wave).collect::<Vec<_>>()));
+    }
 }

@@ -302,16 +302,3 @@ fn efforts_that_one_log_cuts_off_are_told_and_left_out() {
     assert_eq!((fault.kind, &fault.joints), (FaultKind::EffortClipped, &names(&model, &[1])));
     assert!(fault.files == ["run_1.csv"] && !fault.mended, "{fault:#?}");
 }
-
-#[test]
-fn friction_tells_the_sign_of_an_effort_that_nothing_else_tells() {
-    // About a vertical axis, and slow: friction is nearly all.
-    let urdf = r#"<robot name="turntable"><link name="base"/>
-        <link name="table"><inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
-        <joint name="turn" type="revolute"><parent link="base"/><child link="table"/><axis xyz="0 0 1"/>
-        <limit lower="-3" upper="3" effort="10" velocity="1"/></joint></robot>"#;
-    let model = Model::from_urdf(urdf).unwrap().model;
-    let faults = found(&model, 1, |log| times(&mut log.effort[0], -1.0));
-    let fault = only(&faults, FaultKind::EffortSign, names(&model, &[0]), Some(-1.0));
-    assert!(fault.evidence.contains("friction"), "{fault:#?}");
-}

@@ -175,7 +175,8 @@ fn shows(kind: FaultKind, factor: Option<f64>, model: &Model, logs: &[Episode], 
     };
     match kind {
         FaultKind::EffortAbsolute => share(&|x| x < -0.05).min(share(&|x| x > 0.05)) > BOTH_WAYS,
-        FaultKind::EffortClipped => share(&|x| x.abs() > CLIPPED) > BOTH_WAYS,
+        // Where nearly all lies beyond, a constant is left.
+        FaultKind::EffortClipped => share(&|x| x.abs() > CLIPPED).min(share(&|x| x.abs() < CLIPPED)) > BOTH_WAYS,
         FaultKind::PositionZero => turns_weight(model, logs, j, factor.unwrap_or(0.0)),
         FaultKind::VelocityScale => logs.iter().all(|log| log.velocity.is_some()),
         FaultKind::PositionIsCommand => logs.iter().all(|log| log.command.is_some()),

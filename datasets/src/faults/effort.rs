@@ -22,6 +22,8 @@ const ROTOR: f64 = 6.0;
 const ZERO: f64 = 0.02;
 const UP: f64 = 0.2;
 const TURNS: usize = 6;
+/// Beside a joint of which that is clear in the same log, so many are enough.
+const FEW: usize = 3;
 
 /// Why the effort of a joint cannot be used.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,33 +94,42 @@ pub(crate) fn is_passive(model: &Model, sample: &Sample, j: usize) -> bool {
     rms(&torque[j]) < 0.25 * rms(&weight[j]).max(rms(&inertia))
 }
 
-/// Which of some joints have efforts that lost their sign in one log: never negative, down to zero again and again, and like the
-/// model's only in size. Beside one of which that is clear, the first two are enough.
+/// Which of some joints have efforts that lost their sign, each with the logs: never negative, down to zero again and again, and
+/// like the model's only in size. Beside one of which that is clear in a log, the first two are enough; and of a joint that
+/// lost it in one log, never negative in another.
 pub(crate) fn absolute_joints(
     logs: &Logs,
     sample: &Sample,
-    e: usize,
+    torque: &[Vec<f64>],
     joints: &[usize],
-) -> impl Iterator<Item = usize> + use<> {
-    let folded: Vec<usize> = joints.iter().copied().filter(|j| is_folded(&logs.episodes[e].effort[*j])).collect();
-    let clear = |folded: &[usize]| {
-        let sample = sample.only(e);
-        let torque = sample.torque(logs.model);
-        let turns = |j: usize| turns_at_zero(&logs.episodes[e].effort[j]) >= TURNS;
-        folded.iter().any(|&j| turns(j) || is_absolute(&sample, &torque, j))
+) -> Vec<(usize, Vec<usize>)> {
+    let all = || 0..logs.episodes.len();
+    let effort = |e: usize, j: usize| logs.episodes[e].effort[j].as_slice();
+    let turns = |e: usize, j: usize| if is_folded(effort(e, j)) { turns_at_zero(effort(e, j)) } else { 0 };
+    let by_model = |j: usize| all().all(|e| is_folded(effort(e, j))) && is_absolute(sample, torque, j);
+    let clear: Vec<bool> = joints.iter().map(|&j| by_model(j)).collect();
+    let told = |e: usize| clear.contains(&true) || joints.iter().any(|&j| turns(e, j) >= TURNS);
+    let in_log: Vec<bool> = all().map(told).collect();
+    let of = |(&j, clear): (&usize, &bool)| {
+        let lost = |e: usize| *clear || (in_log[e] && turns(e, j) >= FEW);
+        let found = all().any(lost).then(|| all().filter(|&e| lost(e) || is_one_sided(effort(e, j))).collect());
+        found.map(|files| (j, files))
     };
-    let any = !folded.is_empty() && clear(&folded);
-    folded.into_iter().filter(move |_| any)
+    joints.iter().zip(&clear).filter_map(of).collect()
+}
+
+/// Whether an effort is never negative, or never positive.
+fn is_one_sided(effort: &[f64]) -> bool {
+    let (low, high) = effort.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let size = high.abs().max(low.abs());
+    size > 0.0 && (low >= -1e-3 * size || high <= 1e-3 * size)
 }
 
 /// Whether an effort is never negative, or never positive, and down to zero again and again.
 fn is_folded(effort: &[f64]) -> bool {
-    let (low, high) =
-        effort.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
-    let size = high.abs().max(low.abs());
-    let one_sided = low >= -1e-3 * size || high <= 1e-3 * size;
+    let size = effort.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let near_zero = effort.iter().filter(|x| x.abs() < 0.04 * size).count() as f64 > 0.005 * effort.len() as f64;
-    one_sided && near_zero && size > 0.0
+    is_one_sided(effort) && near_zero
 }
 
 /// How often an effort comes down to zero and goes up again.

@@ -98,11 +98,6 @@ impl Sample {
         self.kept(|k| self.log[k] != log)
     }
 
-    /// The places in one log.
-    pub fn only(&self, log: usize) -> Sample {
-        self.kept(|k| self.log[k] == log)
-    }
-
     fn kept(&self, keep: impl Fn(usize) -> bool) -> Sample {
         let row = |row: &Vec<f64>| row.iter().enumerate().filter(|(k, _)| keep(*k)).map(|(_, x)| *x).collect();
         let table = |table: &[Vec<f64>]| table.iter().map(row).collect();

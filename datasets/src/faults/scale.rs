@@ -84,12 +84,13 @@ pub(crate) fn scales(
         let size = scales.iter().filter(|s| **s != 1.0).map(|s| s.abs().ln().abs()).fold(f64::INFINITY, f64::min);
         let turned = scales.iter().any(|s| *s < 0.0);
         let less = if size < 0.8 && !turned { 0.35 } else { 0.6 };
-        let bent = best.asked + 1.5 * SURE < plain.asked && (shared || turned || size > 1.6);
+        let asks = best.asked + 1.5 * SURE < plain.asked;
+        let bent = asks && (shared || turned || size > 1.6);
         let explains = after < 0.45 && (after < less * before || bent);
         if margin > if alone { 2.0 * SURE } else { SURE } && explains {
             taken.clone_from(&scales);
             found.extend(said(logs, &scales, &best, &plain, (sample, &torque)));
-        } else if margin > 0.5 * SURE && cost > 0.0 && explains && !alone {
+        } else if margin > 0.5 * SURE && cost > 0.0 && (explains || asks && after < 0.45) && !alone {
             let joints: Vec<String> =
                 (0..n).filter(|&j| scales[j] != 1.0).map(|j| model.joints()[j].name.clone()).collect();
             found.push(Err(Doubt {

@@ -5,6 +5,7 @@ use super::decide::{Decision, SURE, left};
 use super::effort::{self, Useless};
 use super::sample::Sample;
 use super::shift::Bar;
+use super::units::CLOCKS;
 use super::weigh::{Freedom, Weighed, weigh};
 use super::{Doubt, Fault, FaultKind, Faults, channels, figure, odd, strange};
 use crate::check::{Logs, Seen};
@@ -63,9 +64,9 @@ impl Search {
         if self.faults.len() > before && self.badly_described().is_some_and(|left| left.1 > SETTLED) {
             (self.model, self.episodes) = logged;
             self.seen = None;
-            // What is left out rests on the log more than on the model.
+            // What is left out, and stamps in another unit, rest on the log more than on the model.
             let (kept, asked): (Vec<Fault>, Vec<Fault>) =
-                self.faults.drain(before..).partition(|fault| fault.leaves_joints_out());
+                self.faults.drain(before..).partition(|fault| fault.leaves_joints_out() || is_unit_of_time(fault));
             kept.into_iter().for_each(|fault| self.take(fault));
             self.doubts.extend(asked.into_iter().map(|fault| Doubt {
                 question: format!("{}?", fault.evidence),
@@ -205,14 +206,12 @@ impl Search {
             }
             let useless = |j: &usize| found.iter().any(|fault| fault.changes.contains(&Change::NoEffort(*j)));
             let others: Vec<usize> = (0..logs.model.dof()).filter(|j| !useless(j)).collect();
-            for (e, j) in
-                all.iter().flat_map(|&e| effort::absolute_joints(logs, &sample, e, &others).map(move |j| (e, j)))
-            {
+            for (j, files) in effort::absolute_joints(logs, &sample, &torque, &others) {
                 let evidence =
                     "the effort never changes its sign, though the model's torque does, and is like it in size"
                         .to_owned();
                 let changes = vec![Change::NoEffort(j)];
-                found.push(Fault::new(logs, FaultKind::EffortAbsolute, &[j], &[e], None, evidence, changes));
+                found.push(Fault::new(logs, FaultKind::EffortAbsolute, &[j], &files, None, evidence, changes));
             }
             found
         });
@@ -317,6 +316,12 @@ impl Search {
             _ => {}
         }
     }
+}
+
+/// Whether a fault is a clock in a unit that has a name: no log has steps so long.
+fn is_unit_of_time(fault: &Fault) -> bool {
+    let named = |factor: f64| CLOCKS.iter().any(|(_, unit)| factor == *unit && factor > 1.0);
+    fault.kind == FaultKind::TimeScale && fault.factor.is_some_and(named)
 }
 
 /// A sample of logs.

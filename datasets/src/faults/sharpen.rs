@@ -106,7 +106,11 @@ impl Decision<'_> {
         let most = NAMED + PER_JOINT * active.iter().filter(|active| **active).count() as f64;
         let off = |value: f64| if add { (value - best.1.value).abs() } else { (value / best.1.value).ln().abs() };
         let named = near.into_iter().filter(|value| *value != 0.0 && off(*value) < reach).map(&at);
-        if let Some(named) = named.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|named| named.0 > best.0 - most) {
+        // Degrees are the unit that is met.
+        let met = |(score, account): &(f64, Account)| {
+            score + if account.kind == Kind::Scale && account.value == 1f64.to_degrees() { NAMED } else { 0.0 }
+        };
+        if let Some(named) = named.max_by(|a, b| met(a).total_cmp(&met(b))).filter(|named| named.0 > best.0 - most) {
             return named.1;
         }
         let measured = match account.kind {

@@ -17,7 +17,7 @@ const PART: f64 = 0.1;
 const CUT: f64 = 0.08;
 /// ... and by this many standard errors: neighbouring places share half of their tents.
 const CLEAR: f64 = 6.0;
-/// Beside a joint of which that is clear in the same log, this part beyond is enough.
+/// Beside a clear one in the same log, or of the same joint, this part beyond is enough.
 const BESIDE: f64 = 0.03;
 /// Fewer places tell nothing.
 const FEWEST: usize = 4;
@@ -74,8 +74,11 @@ pub(crate) fn clipped(logs: &Logs, model: &Model, sample: &Sample, scales: &[f64
     let told: Vec<(f64, bool)> = ends.iter().map(told).collect();
     let mut found: BTreeMap<usize, Vec<(&End, f64)>> = BTreeMap::new();
     for (end, (beyond, clear)) in ends.iter().zip(&told) {
-        // A log that cuts one joint's effort off may do so with all: beside a clear one, less is enough.
-        let beside = ends.iter().zip(&told).any(|(other, (_, clear))| *clear && other.log == end.log);
+        // What cuts one joint's effort off may do so with all, and in all logs: beside a clear one, less is enough.
+        let beside = ends
+            .iter()
+            .zip(&told)
+            .any(|(other, (_, clear))| *clear && (other.log == end.log || other.joint == end.joint));
         if *clear || (beside && *beyond > BESIDE) {
             found.entry(end.joint).or_default().push((end, *beyond));
         }

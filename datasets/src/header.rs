@@ -5,7 +5,7 @@ use crate::column_map::ColumnMap;
 use crate::episode::{Channel, Episode};
 use crate::error::{LogError, LogErrorKind};
 use crate::joint_names;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// One column that is read.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,8 +89,10 @@ pub(crate) fn plan(
         )
         .hint(header.known_joints()));
     }
+    let mut fed = BTreeMap::new();
     for channel in Channel::ALL {
         let mut found = joints.iter().map(|joint| header.feed(channel, joint)).collect::<Result<Vec<_>, _>>()?;
+        header.note_shared(channel, &found, &mut fed, &mut plan);
         if channel == Channel::Effort {
             header.take_effort_of_link(&mut found, &mut plan)?;
         }
@@ -403,6 +405,24 @@ impl Header<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Says which quantities come from one and the same column. `fed` holds what each column feeds.
+    fn note_shared(
+        &self,
+        channel: Channel,
+        found: &[Option<Feed>],
+        fed: &mut BTreeMap<usize, String>,
+        plan: &mut Plan,
+    ) {
+        for (joint, feed) in self.joints.iter().zip(found).filter_map(|(joint, feed)| Some((joint, feed.as_ref()?))) {
+            let name = format!("{}.{joint}", channel.name());
+            if let Some(other) = fed.get(&feed.index) {
+                plan.notes.push(format!("`{other}` and `{name}` are read from the same column, `{}`", feed.column));
+            } else {
+                fed.insert(feed.index, name);
+            }
+        }
     }
 
     /// Says which columns are not read.

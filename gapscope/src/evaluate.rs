@@ -82,7 +82,7 @@ pub fn evaluated(args: &Evaluate) -> Result<Evaluated> {
         let (evaluation, paths) = servo::evaluated(args, &loaded)?;
         let table = wanted(&|| servo::table(&loaded, &paths));
         let (json, text) = (serde_json::to_string(&evaluation)?, servo::evaluation_summary(&evaluation));
-        return Ok(Evaluated { json, text, notes: Vec::new(), predictions: Vec::new(), table });
+        return Ok(Evaluated { json, text, notes: loaded.notes(), predictions: Vec::new(), table });
     }
     let corrected = match &args.with {
         Some(file) => {

@@ -3,6 +3,7 @@
 mod args;
 
 use crate::output;
+use crate::report::count;
 use anyhow::{Context, Result, bail};
 use gapscope_datasets::{Episode, Perturbation, Recipe, Reference, Sensors, Trajectory, follow, generate, write_csv};
 use gapscope_dynamics::{Model, robots};
@@ -108,6 +109,13 @@ fn plan(args: &Generate) -> Result<Plan> {
         effects.extend(perturbation.draw(&model, args.seed));
     }
     let mut recipe = recipe(args);
+    let step = recipe.rate.recip();
+    if recipe.rate > 0.0 && recipe.sensors.clock_jitter > 0.5 * step {
+        bail!(
+            "--clock-jitter is {} s, but the stamps lie {step} s apart; it can be half of that at most",
+            recipe.sensors.clock_jitter
+        );
+    }
     let trajectory = args.trajectory.as_deref().map(|file| read_trajectory(file, &model)).transpose()?;
     if let Some(trajectory) = &trajectory {
         recipe.seconds = trajectory.duration();
@@ -214,11 +222,11 @@ fn told(model: &Model, effects: &[Effect], args: &Generate, recipe: &Recipe, out
         if kinds.is_empty() { "no effect that its URDF lacks".to_owned() } else { Vec::from_iter(kinds).join(", ") };
     let lock: String = args.lock.iter().map(|joint| format!(" --lock {joint}")).collect();
     format!(
-        "{}, {} joints, with {lacks}.\n{} logs of {} s at {} Hz with their robot.urdf are in {out}; truth.json says what is in them.\n\
+        "{}, {}, with {lacks}.\n{} of {} s at {} Hz beside robot.urdf in {out}; truth.json says what the logs hold.\n\
          gapscope diagnose {out}/robot.urdf {out}/episode_*.csv{lock}",
         model.name(),
-        model.dof(),
-        args.episodes,
+        count(model.dof(), "joint"),
+        count(args.episodes as usize, "log"),
         recipe.seconds,
         recipe.rate,
     )
@@ -277,7 +285,7 @@ mod tests {
         let file = results.join("next_experiment.csv");
         let line = format!("double_pendulum --episodes 1 --trajectory {}", file.display());
         let told = generated(&line, &logs).unwrap();
-        assert!(told.contains("logs of 20 s"), "{told}");
+        assert!(told.contains("1 log of 20 s"), "{told}");
         let joints: Vec<String> = model.joints().iter().map(|j| j.name.clone()).collect();
         let (logged, _) =
             gapscope_datasets::read_logs(&[logs.join("episode_0.csv")], &joints, &Default::default()).unwrap();

@@ -5,7 +5,7 @@ mod mcap;
 mod parquet;
 
 use crate::cli::Input;
-use crate::input::load;
+use crate::input::{load, strangeness, warn};
 use crate::output;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
@@ -87,7 +87,9 @@ pub fn run(args: &Residuals) -> Result<String> {
     let corrected = match &args.with {
         Some(file) => {
             let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-            Some(Corrected::from_json(&text, &loaded.model).with_context(|| file.display().to_string())?)
+            let corrected = Corrected::from_json(&text, &loaded.model).with_context(|| file.display().to_string())?;
+            warn(&strangeness(corrected.made_from.as_ref(), &args.input, &loaded.origin));
+            Some(corrected)
         }
         None => None,
     };

@@ -1,7 +1,7 @@
 //! `gapscope rollout`: how the models' errors grow over the horizon, beside what one-step errors allow.
 
 use crate::cli::{Input, Kind};
-use crate::input::{Loaded, load};
+use crate::input::{Loaded, load, strangeness, warn};
 use crate::learned;
 use crate::output;
 use crate::report::terminal::{fill, pad};
@@ -77,6 +77,7 @@ pub fn run(args: &Rollout) -> Result<String> {
     progress.enable_steady_tick(Duration::from_millis(120));
     let rolled = rolled(args, &loaded)?;
     progress.finish_and_clear();
+    warn(&rolled.notes);
     output::write(&page, &rolled.page)?;
     Ok(format!("{}Picture  {}", rolled.text, page.display()))
 }
@@ -90,6 +91,8 @@ pub struct Rolled {
     pub text: String,
     /// The HTML page.
     pub page: String,
+    /// What is to be said of the corrected model on these logs.
+    pub notes: Vec<String>,
 }
 
 /// Rolls out and writes nothing.
@@ -98,11 +101,11 @@ pub struct Rolled {
 /// Numbers that cannot be, or models that cannot be read or do not go with the robot or the logs.
 pub fn rolled(args: &Rollout, loaded: &Loaded) -> Result<Rolled> {
     let options = options(args)?;
-    let contenders = contenders(args, &loaded.model)?;
+    let (contenders, notes) = contenders(args, loaded)?;
     let models = rollouts(&loaded.model, &loaded.episodes, &contenders, &options)?;
     let (robot, joints) = (loaded.model.name(), loaded.model.joints().iter().map(|j| j.name.clone()));
     let page = rollout_page(&models, robot, &joints.collect::<Vec<_>>(), &options);
-    Ok(Rolled { text: summary(robot, &models, &options), models, page })
+    Ok(Rolled { text: summary(robot, &models, &options), models, page, notes })
 }
 
 fn options(args: &Rollout) -> Result<RolloutOptions> {
@@ -123,21 +126,24 @@ fn options(args: &Rollout) -> Result<RolloutOptions> {
     Ok(RolloutOptions { horizon: args.horizon, tolerance: args.tolerance, fit: args.fit_start, starts: args.starts })
 }
 
-/// The models to roll out: as described, corrected, with a residual, and without physics, as far as they are given.
-fn contenders(args: &Rollout, robot: &Model) -> Result<Vec<Contender>> {
+/// The models to roll out: as described, corrected, with a residual, and without physics, as far as they are given; beside
+/// them what is to be said of the corrected one on these logs.
+fn contenders(args: &Rollout, loaded: &Loaded) -> Result<(Vec<Contender>, Vec<String>)> {
+    let (robot, mut notes) = (&loaded.model, Vec::new());
     let mut models = vec![Contender::plant("nominal", robot, &[])?];
     if let Some(file) = &args.with {
         let name = || file.display().to_string();
         let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", name()))?;
         let corrected = Corrected::from_json(&text, robot).with_context(name)?;
         models.push(Contender::plant("corrected", robot, &corrected.effects).with_context(name)?);
+        notes = strangeness(corrected.made_from.as_ref(), &args.input, &loaded.origin);
     }
     for (path, kind) in [(&args.residual, Kind::Residual), (&args.pure, Kind::Pure)] {
         if let Some(path) = path {
             models.push(learned::load(path, kind, robot)?);
         }
     }
-    Ok(models)
+    Ok((models, notes))
 }
 
 /// The tables of the terminal.

@@ -1,7 +1,8 @@
 //! How often faults of logs are named, and how often healthy logs are said to have one.
 //!
 //! `cargo run --release -p gapscope-withheld --example faults -- SEED ROUNDS FOLDER…`: each folder holds `robot.urdf` and
-//! healthy logs. Each is tried as it is, then with as many faults as there are rounds, drawn at random.
+//! healthy logs. Each is tried as it is, then with as many faults as there are rounds, drawn at random. `KIND=JointOrder` before
+//! the command tries one kind alone.
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
 
 use gapscope_datasets::{Episode, FaultKind, Faults, ReadOptions, find_faults, read_logs};
@@ -29,7 +30,11 @@ fn main() {
         say("healthy", &folder, &found);
         let mut random = Pcg64::seed_from_u64(seed.wrapping_add(1000 * at as u64));
         for round in 0..rounds {
-            let kind = FAULTS[(at * rounds + round + seed as usize) % FAULTS.len()];
+            let wanted = std::env::var("KIND").unwrap_or_default();
+            let kind = FAULTS
+                .into_iter()
+                .find(|kind| format!("{kind:?}") == wanted)
+                .unwrap_or(FAULTS[(at * rounds + round + seed as usize) % FAULTS.len()]);
             let Some(mut fault) = draw_fault(kind, &model, logs.len(), &mut random) else { continue };
             let mut spoilt = logs.clone();
             if !spoil(&mut fault, &model, &mut spoilt, &mut random) {

@@ -139,7 +139,9 @@ pub(crate) fn any_fault(kinds: &[FaultKind], model: &Model, logs: usize, random:
 /// none is left. Gravity is not the logs': it is in the model that they are held against.
 pub fn spoil(fault: &mut SealedFault, model: &Model, logs: &mut [Episode], random: &mut impl Rng) -> bool {
     let index = |name: &String| model.joints().iter().position(|joint| joint.name == *name);
-    fault.joints.retain(|name| index(name).is_some_and(|j| shows(fault.kind, fault.factor, model, logs, j)));
+    // Of one log that is wrong, the others show nothing.
+    let wrong = fault.log.map_or(&logs[..], |log| std::slice::from_ref(&logs[log]));
+    fault.joints.retain(|name| index(name).is_some_and(|j| shows(fault.kind, fault.factor, model, wrong, j)));
     let joints: Vec<usize> = fault.joints.iter().filter_map(index).collect();
     if joints.is_empty()
         && !matches!(fault.kind, FaultKind::TimeScale | FaultKind::RepeatedSamples | FaultKind::Gravity)
@@ -147,12 +149,14 @@ pub fn spoil(fault: &mut SealedFault, model: &Model, logs: &mut [Episode], rando
         return false;
     }
     let bare = random.random_bool(NO_VELOCITY) && fault.kind != FaultKind::VelocityScale;
+    // In half of the cases an exchanged joint is another in every channel, in all logs alike.
+    let every_channel = random.random_bool(0.5);
     for (e, log) in logs.iter_mut().enumerate() {
         if bare {
             log.velocity = None;
         }
         if fault.log.is_none_or(|only| only == e) {
-            spoil_log(fault, &joints, log, random);
+            spoil_log(fault, &joints, every_channel, log, random);
         }
     }
     true
@@ -160,12 +164,19 @@ pub fn spoil(fault: &mut SealedFault, model: &Model, logs: &mut [Episode], rando
 
 /// Whether a fault shows at a joint: its logs have what the fault changes.
 fn shows(kind: FaultKind, factor: Option<f64>, model: &Model, logs: &[Episode], j: usize) -> bool {
-    let all = || logs.iter().flat_map(|log| log.effort[j].iter().copied());
-    let most = all().fold(0.0, |most: f64, x| most.max(x.abs()));
-    let share = |is: &dyn Fn(f64) -> bool| all().filter(|x| is(*x)).count() as f64 / all().count().max(1) as f64;
+    let most = |log: &Episode| log.effort[j].iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    // Part of the samples, in the log that has the fewest: the size of the effort is each log's own.
+    let share = |is: &dyn Fn(f64) -> bool| {
+        let of = |log: &Episode| {
+            let most = most(log);
+            log.effort[j].iter().filter(|x| is(*x / most)).count() as f64 / log.len().max(1) as f64
+        };
+        logs.iter().map(of).fold(1.0, f64::min)
+    };
     match kind {
-        FaultKind::EffortAbsolute => share(&|x| x < -0.05 * most).min(share(&|x| x > 0.05 * most)) > BOTH_WAYS,
-        FaultKind::EffortClipped => share(&|x| x.abs() > CLIPPED * most) > BOTH_WAYS,
+        FaultKind::EffortAbsolute => share(&|x| x < -0.05).min(share(&|x| x > 0.05)) > BOTH_WAYS,
+        // Where nearly all lies beyond, a constant is left.
+        FaultKind::EffortClipped => share(&|x| x.abs() > CLIPPED).min(share(&|x| x.abs() < CLIPPED)) > BOTH_WAYS,
         FaultKind::PositionZero => turns_weight(model, logs, j, factor.unwrap_or(0.0)),
         FaultKind::VelocityScale => logs.iter().all(|log| log.velocity.is_some()),
         FaultKind::PositionIsCommand => logs.iter().all(|log| log.command.is_some()),
@@ -197,7 +208,7 @@ fn turns_weight(model: &Model, logs: &[Episode], j: usize, zero: f64) -> bool {
     (0..n).any(|i| change[i] > TURNED * variance(effort[i]))
 }
 
-fn spoil_log(fault: &SealedFault, joints: &[usize], log: &mut Episode, random: &mut impl Rng) {
+fn spoil_log(fault: &SealedFault, joints: &[usize], every_channel: bool, log: &mut Episode, random: &mut impl Rng) {
     use FaultKind as K;
     let factor = fault.factor.unwrap_or(1.0);
     let times = |row: &mut Vec<f64>, factor: f64| row.iter_mut().for_each(|x| *x *= factor);
@@ -251,8 +262,7 @@ fn spoil_log(fault: &SealedFault, joints: &[usize], log: &mut Episode, random: &
         }
         (K::JointOrder, &[a, b]) => {
             log.effort.swap(a, b);
-            // In half of the cases the joint is another in every channel.
-            if random.random_bool(0.5) {
+            if every_channel {
                 log.position.swap(a, b);
                 let others = [&mut log.velocity, &mut log.command, &mut log.effort_link, &mut log.temperature];
                 others.into_iter().flatten().for_each(|samples| samples.swap(a, b));

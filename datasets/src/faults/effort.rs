@@ -11,6 +11,20 @@ pub(crate) const GAINS: (f64, f64) = (0.67, 1.5);
 /// A gain between these is as logged at first sight.
 const PLAIN: (f64, f64) = (0.6, 1.7);
 
+/// Dry friction of the wrong sign explains at least this part of what the model leaves of the effort, squared.
+const DRIVES: f64 = 0.5;
+
+/// A rotor may take up to so many times the torque that the description does.
+const ROTOR: f64 = 6.0;
+
+/// An effort without its sign turns at zero, this part of its size, again and again: it comes from this part so many times. One
+/// that keeps its sign because of a weight turns at zero by chance alone.
+const ZERO: f64 = 0.02;
+const UP: f64 = 0.2;
+const TURNS: usize = 6;
+/// Beside a joint of which that is clear in the same log, so many are enough.
+const FEW: usize = 3;
+
 /// Why the effort of a joint cannot be used.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Useless {
@@ -80,21 +94,55 @@ pub(crate) fn is_passive(model: &Model, sample: &Sample, j: usize) -> bool {
     rms(&torque[j]) < 0.25 * rms(&weight[j]).max(rms(&inertia))
 }
 
-/// Which of some joints have efforts that lost their sign: never negative, down to zero again and again, and like the model's
-/// only in size. Beside one of which that is clear, the first two are enough.
-pub(crate) fn absolute_joints(logs: &Logs, sample: &Sample, torque: &[Vec<f64>], joints: &[usize]) -> Vec<usize> {
-    let folded: Vec<usize> = joints.iter().copied().filter(|j| is_folded(logs, *j)).collect();
-    if folded.iter().any(|j| is_absolute(sample, torque, *j)) { folded } else { Vec::new() }
+/// Which of some joints have efforts that lost their sign, each with the logs: never negative, down to zero again and again, and
+/// like the model's only in size. Beside one of which that is clear in a log, the first two are enough; and of a joint that
+/// lost it in one log, never negative in another.
+pub(crate) fn absolute_joints(
+    logs: &Logs,
+    sample: &Sample,
+    torque: &[Vec<f64>],
+    joints: &[usize],
+) -> Vec<(usize, Vec<usize>)> {
+    let all = || 0..logs.episodes.len();
+    let effort = |e: usize, j: usize| logs.episodes[e].effort[j].as_slice();
+    let turns = |e: usize, j: usize| if is_folded(effort(e, j)) { turns_at_zero(effort(e, j)) } else { 0 };
+    let by_model = |j: usize| all().all(|e| is_folded(effort(e, j))) && is_absolute(sample, torque, j);
+    let clear: Vec<bool> = joints.iter().map(|&j| by_model(j)).collect();
+    let told = |e: usize| clear.contains(&true) || joints.iter().any(|&j| turns(e, j) >= TURNS);
+    let in_log: Vec<bool> = all().map(told).collect();
+    let of = |(&j, clear): (&usize, &bool)| {
+        let lost = |e: usize| *clear || (in_log[e] && turns(e, j) >= FEW);
+        let found = all().any(lost).then(|| all().filter(|&e| lost(e) || is_one_sided(effort(e, j))).collect());
+        found.map(|files| (j, files))
+    };
+    joints.iter().zip(&clear).filter_map(of).collect()
 }
 
-/// Whether a joint's effort is never negative, or never positive, and down to zero again and again, while the joint reverses.
-fn is_folded(logs: &Logs, j: usize) -> bool {
-    let all = || logs.episodes.iter().flat_map(|episode| episode.effort[j].iter().copied());
-    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+/// Whether an effort is never negative, or never positive.
+fn is_one_sided(effort: &[f64]) -> bool {
+    let (low, high) = effort.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     let size = high.abs().max(low.abs());
-    let one_sided = low >= -1e-3 * size || high <= 1e-3 * size;
-    let near_zero = all().filter(|x| x.abs() < 0.04 * size).count() as f64 > 0.005 * all().count() as f64;
-    one_sided && near_zero && size > 0.0
+    size > 0.0 && (low >= -1e-3 * size || high <= 1e-3 * size)
+}
+
+/// Whether an effort is never negative, or never positive, and down to zero again and again.
+fn is_folded(effort: &[f64]) -> bool {
+    let size = effort.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let near_zero = effort.iter().filter(|x| x.abs() < 0.04 * size).count() as f64 > 0.005 * effort.len() as f64;
+    is_one_sided(effort) && near_zero
+}
+
+/// How often an effort comes down to zero and goes up again.
+fn turns_at_zero(effort: &[f64]) -> usize {
+    let size = effort.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let (mut up, mut turns) = (false, 0);
+    for x in effort.iter().map(|x| x.abs()) {
+        if up && x < ZERO * size {
+            (up, turns) = (false, turns + 1);
+        }
+        up |= x > UP * size;
+    }
+    turns
 }
 
 fn is_absolute(sample: &Sample, torque: &[Vec<f64>], j: usize) -> bool {
@@ -116,27 +164,19 @@ pub(crate) fn explained(sample: &Sample, torque: &[Vec<f64>], j: usize) -> Optio
     fit(&sample.effort[j], &torque[j], &sample.v[j], None)
 }
 
-/// Part of a joint's samples that lie on its greatest or least effort to the bit, in runs: where, and how many.
-pub(crate) fn cut_off(logs: &Logs, j: usize) -> Option<(f64, f64)> {
-    let all = || logs.episodes.iter().map(|episode| &episode.effort[j]);
-    let count: usize = all().map(Vec::len).sum();
-    let high = all().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
-    let low = all().flatten().copied().fold(f64::INFINITY, f64::min);
-    let at = |end: f64| all().flat_map(|row| row.windows(3)).filter(|run| run.iter().all(|x| *x == end)).count();
-    [(high, at(high)), (low, at(low))]
-        .into_iter()
-        .filter(|(end, times)| *end != 0.0 && *times as f64 > 0.02 * count as f64)
-        .map(|(end, times)| (end, times as f64 / count.max(1) as f64))
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-}
-
-/// Where the effort lies at its end, how far an account takes it beyond, relative: what a log cut off, the motion still shows.
-pub(crate) fn beyond_the_end(sample: &Sample, predicted: &[f64], j: usize, end: f64) -> f64 {
-    let at: Vec<f64> = (0..sample.len())
-        .filter(|&k| (sample.effort[j][k] - end).abs() < 1e-6 * end.abs())
-        .map(|k| predicted[k] / end - 1.0)
-        .collect();
-    if at.len() < 5 { 0.0 } else { at.iter().sum::<f64>() / at.len() as f64 }
+/// Whether most of what a joint's effort holds beside the model's torque goes with the motion, as friction would that gave
+/// energy instead of taking it: then the effort, or the position, is counted the other way round.
+pub(crate) fn friction_drives(sample: &Sample, torque: &[Vec<f64>], j: usize) -> bool {
+    let slow = 0.1 * rms(&sample.v[j]);
+    let mut left: Vec<f64> = sample.effort[j].iter().zip(&torque[j]).map(|(effort, torque)| effort - torque).collect();
+    let mut dry: Vec<f64> = sample.v[j].iter().map(|v| (v / slow.max(1e-12)).tanh()).collect();
+    for row in [&mut left, &mut dry] {
+        let mean = row.iter().sum::<f64>() / row.len().max(1) as f64;
+        row.iter_mut().for_each(|x| *x -= mean);
+    }
+    let with = left.iter().zip(&dry).map(|(x, y)| x * y).sum::<f64>();
+    let [left, dry] = [left, dry].map(|row| row.iter().map(|x| x * x).sum::<f64>());
+    with < 0.0 && with * with > DRIVES * left * dry
 }
 
 /// What each joint's effort was multiplied by, at first sight: 1 where nothing speaks against it.
@@ -144,9 +184,12 @@ pub(crate) fn first_scales(model: &Model, sample: &Sample, active: &[bool]) -> V
     let torque = sample.torque(model);
     let scale = |j: usize| {
         let found = explained(sample, &torque, j).filter(|_| active[j]);
-        found
+        let told = found
             .filter(|fit| fit.correlation.abs() > 0.5 && fit.weight * fit.gain.abs() > 0.05)
-            .map(|fit| if (PLAIN.0..PLAIN.1).contains(&fit.gain) { 1.0 } else { fit.gain })
+            .map(|fit| if (PLAIN.0..PLAIN.1).contains(&fit.gain) { 1.0 } else { fit.gain });
+        // A rotor that the description lacks makes a gain of some size: the sign is what friction tells.
+        let size_is_told = told.is_some_and(|gain: f64| gain > 0.0 || !(ROTOR.recip()..ROTOR).contains(&-gain));
+        if !size_is_told && active[j] && friction_drives(sample, &torque, j) { Some(-1.0) } else { told }
     };
     let told: Vec<Option<f64>> = (0..model.dof()).map(scale).collect();
     if let Some(one) = common(&told, active) {
@@ -191,7 +234,8 @@ pub(crate) fn fine_scales(
     let one = (0..n).filter(|&j| active[j]).all(|j| scales[j] == scales[(0..n).find(|&i| active[i]).unwrap_or(0)]);
     let mut weighed = weigh(model, sample, &scales, active, Freedom::ORDINARY);
     for _ in 0..4 {
-        let scaled: Vec<usize> = (0..n).filter(|&j| active[j] && scales[j] != 1.0).collect();
+        // A sign is a sign.
+        let scaled: Vec<usize> = (0..n).filter(|&j| active[j] && scales[j].abs() != 1.0).collect();
         if scaled.is_empty() {
             break;
         }
@@ -231,4 +275,38 @@ pub(crate) fn effort_unit(scale: f64, error: f64, limit: Option<f64>) -> Option<
     // Of two that fit, neither is known.
     let [one] = fitting.as_slice() else { return None };
     Some(one.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn friction_gives_no_energy() {
+        let v: Vec<f64> = (0..200).map(|k| (0.1 * f64::from(k)).sin()).collect();
+        let torque = vec![v.iter().map(|v| 0.2 * v * v).collect::<Vec<f64>>()];
+        let driven = |size: f64| {
+            let effort = v.iter().zip(&torque[0]).map(|(v, torque)| torque + size * v.signum() - 0.3).collect();
+            let zero = || vec![vec![0.0; v.len()]];
+            let sample = Sample {
+                q: zero(),
+                v: vec![v.clone()],
+                a: zero(),
+                effort: vec![effort],
+                log: vec![0; v.len()],
+                tents: vec![[0.0; 3]; v.len()],
+            };
+            friction_drives(&sample, &torque, 0)
+        };
+        assert!(!driven(1.0) && driven(-1.0));
+    }
+
+    #[test]
+    fn an_effort_without_its_sign_turns_at_zero() {
+        let wave = |k: i32| (0.05 * f64::from(k)).sin();
+        let folded: Vec<f64> = (0..1000).map(|k| wave(k).abs()).collect();
+        let lifted: Vec<f64> = (0..1000).map(|k| 1.05 + wave(k)).collect();
+        assert!(is_folded(&folded) && turns_at_zero(&folded) >= TURNS);
+        assert!(turns_at_zero(&lifted) == 0 && !is_folded(&(0..1000).map(wave).collect::<Vec<_>>()));
+    }
 }

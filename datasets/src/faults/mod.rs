@@ -6,6 +6,7 @@
 
 mod change;
 mod channels;
+mod clipped;
 mod decide;
 mod determined;
 mod effort;
@@ -19,6 +20,7 @@ mod scale;
 mod search;
 mod sharpen;
 mod shift;
+mod strange;
 mod units;
 mod weigh;
 mod words;

@@ -1,8 +1,9 @@
 //! Unit and sign of the efforts: factors outside 0.67 to 1.5 that the model cannot take for another robot.
 
 use super::change::Change;
+use super::clipped::clipped;
 use super::decide::scales_cost;
-use super::effort::{GAINS, beyond_the_end, cut_off, effort_unit, fine_scales, first_scales};
+use super::effort::{GAINS, effort_unit, fine_scales, first_scales, friction_drives};
 use super::sample::Sample;
 use super::weigh::{Freedom, spread, weigh, weigh_either};
 use super::{Doubt, Fault, FaultKind, figure};
@@ -17,8 +18,6 @@ const SURE: f64 = 12.0;
 const WITNESS: f64 = 0.04;
 /// A factor that is known no better than this, relative, is no mend: a robot's gains alone differ by 0.07.
 const KNOWN: f64 = 0.055;
-/// A log cuts the effort off where the motion shows it to go on by this part beyond.
-const CUT: f64 = 0.08;
 
 /// What is wrong with the scale of the efforts, or with their ends; what may be.
 pub(crate) fn scales(
@@ -32,7 +31,7 @@ pub(crate) fn scales(
     let plain = weigh(model, sample, &vec![1.0; n], active, Freedom::ORDINARY);
     let first = first_scales(model, sample, active);
     let mut found = Vec::new();
-    let mut predicted = plain.predicted.clone();
+    let mut taken = vec![1.0; n];
     if scales_cost(&first, active) > 0.0 {
         let (mut scales, mut best) = fine_scales(model, sample, first, active);
         let mut cost = scales_cost(&scales, active);
@@ -45,7 +44,9 @@ pub(crate) fn scales(
             let limit = model.joints()[j].limits.effort.filter(|limit| *limit > 0.0).unwrap_or(f64::INFINITY);
             let impossible = rms(&sample.effort[j]) > 1.2 * limit;
             let own = varies[j] > WITNESS * most && (varies[j] > WITNESS * limit || limit == f64::INFINITY);
-            if alone_of(&scales, j) && !own && !impossible {
+            // Of the sign friction is a witness too.
+            let drives = scales[j] < 0.0 && friction_drives(sample, &torque, j);
+            if alone_of(&scales, j) && !own && !impossible && !drives {
                 scales[j] = 1.0;
                 (scales, best) = fine_scales(model, sample, scales, active);
                 cost = scales_cost(&scales, active);
@@ -83,13 +84,13 @@ pub(crate) fn scales(
         let size = scales.iter().filter(|s| **s != 1.0).map(|s| s.abs().ln().abs()).fold(f64::INFINITY, f64::min);
         let turned = scales.iter().any(|s| *s < 0.0);
         let less = if size < 0.8 && !turned { 0.35 } else { 0.6 };
-        let bent = best.asked + 1.5 * SURE < plain.asked && (shared || turned || size > 1.6);
+        let asks = best.asked + 1.5 * SURE < plain.asked;
+        let bent = asks && (shared || turned || size > 1.6);
         let explains = after < 0.45 && (after < less * before || bent);
         if margin > if alone { 2.0 * SURE } else { SURE } && explains {
-            predicted.clone_from(&best.predicted);
-            (0..n).for_each(|j| predicted[j].iter_mut().for_each(|x| *x *= scales[j]));
-            found.extend(said(logs, &scales, &best, &plain));
-        } else if margin > 0.5 * SURE && cost > 0.0 && explains && !alone {
+            taken.clone_from(&scales);
+            found.extend(said(logs, &scales, &best, &plain, (sample, &torque)));
+        } else if margin > 0.5 * SURE && cost > 0.0 && (explains || asks && after < 0.45) && !alone {
             let joints: Vec<String> =
                 (0..n).filter(|&j| scales[j] != 1.0).map(|j| model.joints()[j].name.clone()).collect();
             found.push(Err(Doubt {
@@ -103,21 +104,7 @@ pub(crate) fn scales(
             }));
         }
     }
-    for j in (0..n).filter(|&j| active[j]) {
-        let Some((end, share)) = cut_off(logs, j) else { continue };
-        let beyond = beyond_the_end(sample, &predicted[j], j, end);
-        if beyond > CUT {
-            let evidence = format!(
-                "{} % of the samples lie at {} to the last digit, where the motion takes {} % more",
-                figure(100.0 * share),
-                figure(end),
-                figure(100.0 * beyond)
-            );
-            let all: Vec<usize> = (0..logs.episodes.len()).collect();
-            let changes = vec![Change::NoEffort(j)];
-            found.push(Ok(Fault::new(logs, FaultKind::EffortClipped, &[j], &all, None, evidence, changes)));
-        }
-    }
+    found.extend(clipped(logs, model, sample, &taken, active).into_iter().map(Ok));
     found
 }
 
@@ -127,6 +114,7 @@ fn said(
     scales: &[f64],
     best: &super::weigh::Weighed,
     plain: &super::weigh::Weighed,
+    (sample, torque): (&Sample, &[Vec<f64>]),
 ) -> Vec<Result<Fault, Doubt>> {
     let n = scales.len();
     let mut left: Vec<usize> = (0..n).filter(|&j| scales[j] != 1.0).collect();
@@ -168,6 +156,10 @@ fn said(
             continue;
         }
         let what = match &unit {
+            _ if turned && friction_drives(sample, torque, group[0]) => {
+                "goes with the motion where friction goes against it: it, or the position, has the opposite sign"
+                    .to_owned()
+            }
             _ if turned => "has the opposite sign to the model's torque".to_owned(),
             Some((name, factor)) => format!("is in {name}: {} times N m (N)", figure(*factor)),
             None => format!(

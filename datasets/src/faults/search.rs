@@ -5,25 +5,17 @@ use super::decide::{Decision, SURE, left};
 use super::effort::{self, Useless};
 use super::sample::Sample;
 use super::shift::Bar;
+use super::units::CLOCKS;
 use super::weigh::{Freedom, Weighed, weigh};
-use super::words::per_cent;
-use super::{Doubt, Fault, FaultKind, Faults, channels, figure, odd};
+use super::{Doubt, Fault, FaultKind, Faults, channels, figure, odd, strange};
 use crate::check::{Logs, Seen};
 use crate::episode::Episode;
-use crate::robust::rms;
 use gapscope_dynamics::Model;
 
 /// Shifts below this are an effect, s: the border is 20 ms, and a lag of that looks like one a little longer.
 const SHIFT: f64 = 0.022;
-/// Logs that leave more than this of the effort, squared, even of a robot that was described badly, may be another's.
-const STRANGE: f64 = 0.5;
-/// Logs whose effort is, in the mean, more than this times the limit of the drive may be in another unit.
-const STRONG: f64 = 2.0;
 /// What the model says is wrong is beyond doubt where the mended logs leave less than this of the effort, squared.
 const SETTLED: f64 = 0.1;
-/// A robot whose mass is outside of these parts of the described one may be another, or be logged in other units: its links are
-/// off by a third at most, and it carries no more than that.
-const MASS: (f64, f64) = (0.62, 1.6);
 /// At most so many things are wrong with the motion.
 const ROUNDS: usize = 6;
 /// The logs while faults are taken out of them.
@@ -72,12 +64,15 @@ impl Search {
         if self.faults.len() > before && self.badly_described().is_some_and(|left| left.1 > SETTLED) {
             (self.model, self.episodes) = logged;
             self.seen = None;
-            let asked = self.faults.drain(before..).map(|fault| Doubt {
+            // What is left out, and stamps in another unit, rest on the log more than on the model.
+            let (kept, asked): (Vec<Fault>, Vec<Fault>) =
+                self.faults.drain(before..).partition(|fault| fault.leaves_joints_out() || is_unit_of_time(fault));
+            kept.into_iter().for_each(|fault| self.take(fault));
+            self.doubts.extend(asked.into_iter().map(|fault| Doubt {
                 question: format!("{}?", fault.evidence),
                 joints: fault.joints,
                 effects: Vec::new(),
-            });
-            self.doubts.extend(asked);
+            }));
         }
         self.stranger();
         let velocities = self.with_logs(channels::velocities);
@@ -211,12 +206,12 @@ impl Search {
             }
             let useless = |j: &usize| found.iter().any(|fault| fault.changes.contains(&Change::NoEffort(*j)));
             let others: Vec<usize> = (0..logs.model.dof()).filter(|j| !useless(j)).collect();
-            for j in effort::absolute_joints(logs, &sample, &torque, &others) {
+            for (j, files) in effort::absolute_joints(logs, &sample, &torque, &others) {
                 let evidence =
                     "the effort never changes its sign, though the model's torque does, and is like it in size"
                         .to_owned();
                 let changes = vec![Change::NoEffort(j)];
-                found.push(Fault::new(logs, FaultKind::EffortAbsolute, &[j], &all, None, evidence, changes));
+                found.push(Fault::new(logs, FaultKind::EffortAbsolute, &[j], &files, None, evidence, changes));
             }
             found
         });
@@ -284,25 +279,9 @@ impl Search {
             return;
         }
         let Some((weighed, left)) = self.badly_described() else { return };
-        let mass = weighed.mass;
-        let strong = self.with_logs(strong);
-        let question = if left > STRANGE {
-            format!(
-                "are these the logs of this robot? Whatever its bodies and friction, {} of the effort, squared, is left",
-                per_cent(left)
-            )
-        } else if !(MASS.0..MASS.1).contains(&mass) {
-            format!(
-                "are effort, position and time in N m (N), rad (m) and s? They ask for a robot of {} times the mass that the description has",
-                figure(mass)
-            )
-        } else if let Some((j, times)) = strong {
-            let joint = &self.model.joints()[j].name;
-            format!("is the effort of {joint} in N m (N)? It is {} times the limit of its drive", figure(times))
-        } else {
-            return;
-        };
-        self.doubts.push(Doubt { question, joints: Vec::new(), effects: Vec::new() });
+        let question = self.with_logs(|logs| strange::question(logs, &weighed, left, &Self::active(logs)));
+        let doubt = question.map(|question| Doubt { question, joints: Vec::new(), effects: Vec::new() });
+        self.doubts.extend(doubt);
     }
 
     /// The logs as they now are, held against a robot that was described badly, and what that leaves of the effort.
@@ -330,21 +309,19 @@ impl Search {
             }
             super::shift::shift(logs, logs.model, &sample, &active, bar)
         });
-        if let Some(fault) = found {
-            self.take(fault);
+        match found {
+            Some(Ok(fault)) => self.take(fault),
+            // Where something is asked already, a shift may be what that does.
+            Some(Err(doubt)) if self.doubts.is_empty() => self.doubts.push(doubt),
+            _ => {}
         }
     }
 }
 
-/// The joint whose effort passes the limit of its drive most, and how many times, where no drive does that.
-fn strong(logs: &Logs) -> Option<(usize, f64)> {
-    let times = |(j, joint): (usize, &gapscope_dynamics::Joint)| {
-        let limit = joint.limits.effort.filter(|limit| *limit > 0.0)?;
-        let most = logs.episodes.iter().map(|episode| rms(&episode.effort[j])).fold(0.0, f64::max);
-        Some((j, most / limit))
-    };
-    let all = logs.model.joints().iter().enumerate().filter_map(times);
-    all.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, times)| *times > STRONG)
+/// Whether a fault is a clock in a unit that has a name: no log has steps so long.
+fn is_unit_of_time(fault: &Fault) -> bool {
+    let named = |factor: f64| CLOCKS.iter().any(|(_, unit)| factor == *unit && factor > 1.0);
+    fault.kind == FaultKind::TimeScale && fault.factor.is_some_and(named)
 }
 
 /// A sample of logs.

@@ -13,6 +13,10 @@ use std::f64::consts::FRAC_PI_2;
 /// By how many nats a unit with a name, or a right angle, may fit worse than what lies beside it: bodies that are off by a
 /// few per cent move a factor by as much.
 const NAMED: f64 = 12.0;
+/// And further nats for each joint: a sixth more of its effort, squared, where no account leaves nothing.
+const PER_JOINT: f64 = 9.0;
+/// A unit with a name that limits ask for is that unit within a factor of two.
+const UNTOLD: f64 = std::f64::consts::LN_2;
 
 /// Factors that are tried on either side of one that limits alone tell, and from one to the next: up to thirty times.
 const ROUGH: i32 = 23;
@@ -95,12 +99,18 @@ impl Decision<'_> {
         let reach = match account.kind {
             Kind::Zero => 0.12,
             Kind::Clock => 0.15,
-            _ if account.inside > 0 => STEP.powi(2).ln(),
+            // Limits tell that there is a unit, friction and rotors hardly which.
+            _ if account.inside > 0 => UNTOLD,
             _ => 0.05,
         };
+        let most = NAMED + PER_JOINT * active.iter().filter(|active| **active).count() as f64;
         let off = |value: f64| if add { (value - best.1.value).abs() } else { (value / best.1.value).ln().abs() };
         let named = near.into_iter().filter(|value| *value != 0.0 && off(*value) < reach).map(&at);
-        if let Some(named) = named.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|named| named.0 > best.0 - NAMED) {
+        // Degrees are the unit that is met.
+        let met = |(score, account): &(f64, Account)| {
+            score + if account.kind == Kind::Scale && account.value == 1f64.to_degrees() { NAMED } else { 0.0 }
+        };
+        if let Some(named) = named.max_by(|a, b| met(a).total_cmp(&met(b))).filter(|named| named.0 > best.0 - most) {
             return named.1;
         }
         let measured = match account.kind {

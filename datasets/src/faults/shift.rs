@@ -3,7 +3,7 @@
 use super::change::Change;
 use super::sample::Sample;
 use super::weigh::{Freedom, weigh};
-use super::{Fault, FaultKind, figure};
+use super::{Doubt, Fault, FaultKind, figure};
 use crate::check::{Logs, fit};
 use gapscope_dynamics::Model;
 
@@ -20,6 +20,10 @@ const FLOOR: f64 = 1e-3;
 /// that must have been left. Bristles and play look like a shift that takes two thirds of what is left.
 const TOGETHER: (f64, f64, f64) = (0.25, 0.3, 0.003);
 
+/// A shift that leaves up to twice that part is asked where it is so many times the shortest: bristles and play look like
+/// short ones.
+const LONG: f64 = 2.0;
+
 /// What is asked of a shift.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bar {
@@ -32,7 +36,13 @@ pub(crate) struct Bar {
 }
 
 /// A shift of all joints that leaves no doubt. Of one joint by itself it is hardly ever one: topics are merged as wholes.
-pub(crate) fn shift(logs: &Logs, model: &Model, sample: &Sample, active: &[bool], bar: Bar) -> Option<Fault> {
+pub(crate) fn shift(
+    logs: &Logs,
+    model: &Model,
+    sample: &Sample,
+    active: &[bool],
+    bar: Bar,
+) -> Option<Result<Fault, Doubt>> {
     let n = model.dof();
     let ones = vec![1.0; n];
     let weighed = |sample: &Sample, freedom: Freedom| weigh(model, sample, &ones, active, freedom);
@@ -98,7 +108,11 @@ pub(crate) fn shift(logs: &Logs, model: &Model, sample: &Sample, active: &[bool]
     if bar.nothing_else && !after.is_plain(active) {
         return None;
     }
-    if after.score - before.score < bar.sure || now > part * left || now > most || left < least_left {
+    if after.score - before.score < bar.sure || now > most || left < least_left {
+        return None;
+    }
+    let clear = now <= part * left;
+    if !clear && (bar.nothing_else || now > 2.0 * part * left || best.abs() < LONG * bar.least) {
         return None;
     }
     let (late, side) = if best > 0.0 { (best, "later") } else { (-best, "earlier") };
@@ -108,7 +122,11 @@ pub(crate) fn shift(logs: &Logs, model: &Model, sample: &Sample, active: &[bool]
         figure(100.0 * now),
         figure(100.0 * left)
     );
+    if !clear {
+        let joints = group.iter().map(|&j| model.joints()[j].name.clone()).collect();
+        return Some(Err(Doubt { question: format!("{evidence}?"), joints, effects: Vec::new() }));
+    }
     let changes = group.iter().map(|&j| Change::Late(j, best)).collect();
     let files: Vec<usize> = (0..logs.episodes.len()).collect();
-    Some(Fault::new(logs, FaultKind::TimeShift, &group, &files, Some(best), evidence, changes))
+    Some(Ok(Fault::new(logs, FaultKind::TimeShift, &group, &files, Some(best), evidence, changes)))
 }

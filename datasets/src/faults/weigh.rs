@@ -56,6 +56,8 @@ pub(crate) struct Weighed {
     pub narrowed: Vec<f64>,
     /// Mass that the effort asks the robot to have, over that of its description; gains of the drives are in it.
     pub mass: f64,
+    /// Effort that each joint's own motion asks for beside friction and bias, over what the description takes for it.
+    pub inertia: Vec<f64>,
     /// What it makes of the effort, joint-major, N m or N.
     pub predicted: Vec<Vec<f64>>,
 }
@@ -169,6 +171,17 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
         };
         (0..places).map(at).collect()
     });
+    // Without what friction and bias take: the first three of the joint's own columns.
+    let inertia = |j: usize| {
+        let friction = 10 * n + OWN * j..10 * n + OWN * j + 3;
+        let (mut sum, mut size) = (0.0, 0.0);
+        for (row, torque) in rows[j].chunks_exact(width).zip(&torque[j]) {
+            let further = row.iter().zip(solution.iter()).enumerate();
+            let further: f64 = further.filter(|(i, _)| !friction.contains(i)).map(|(_, (x, p))| x * p).sum();
+            (sum, size) = (sum + (torque + further) * torque, size + torque * torque);
+        }
+        if active[j] && size > 0.0 { sum / size } else { 1.0 }
+    };
     let described: f64 = model.joints().iter().map(|joint| joint.inertia.mass.abs()).sum();
     let further: f64 = (0..n).map(|j| solution[10 * j]).sum();
     let gains: Vec<f64> = (0..n).filter(|&j| active[j]).map(|j| 1.0 + solution[gain_at(j)]).collect();
@@ -176,6 +189,7 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
     Weighed {
         score: likelihood - asked,
         mass: (1.0 + further / described.max(1e-9)) * mean_gain,
+        inertia: (0..n).map(inertia).collect(),
         asked,
         unexplained,
         gain: (0..n).map(|j| 1.0 + solution[gain_at(j)]).collect(),

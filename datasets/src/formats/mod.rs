@@ -165,7 +165,10 @@ fn cannot_read(error: &std::io::Error) -> LogError {
 /// The first bytes of a file, 16 at most.
 fn head(path: &Path) -> Result<Vec<u8>, LogError> {
     let mut head = Vec::new();
-    let file = std::fs::File::open(path).map_err(|error| cannot_read(&error))?;
+    let file = std::fs::File::open(path).map_err(|error| {
+        let stdin = path == Path::new("-");
+        if stdin { cannot_read(&error).hint("A log on standard input is /dev/stdin") } else { cannot_read(&error) }
+    })?;
     file.take(16).read_to_end(&mut head).map_err(|error| cannot_read(&error))?;
     Ok(head)
 }

@@ -261,8 +261,8 @@ fn limits_tell_a_position_in_another_unit_and_masses_ask_for_one() {
     let counts = 65536.0;
     let fault = only(&without_velocity(counts, 1.0), FaultKind::PositionScale, names(&model, &[0]), None);
     assert!((fault.factor.unwrap() / counts - 1.0).abs() < 0.15, "{fault:#?}");
-    // A part of the effort may be a carriage that is lighter: it is asked, or beyond doubt, and never silent.
-    for effort in [0.25, 1.0 / 35.0] {
+    // A part of the effort, or a multiple, may be another carriage, or a rotor: it is asked, or beyond doubt, and never silent.
+    for effort in [0.25, 1.0 / 35.0, 0.5, 2.0, 3.0] {
         let faults = without_velocity(1.0, effort);
         assert!(!faults.faults.is_empty() || !faults.doubts.is_empty(), "{effort}: nothing is said");
     }
@@ -289,4 +289,16 @@ fn one_log_of_several_is_named() {
     assert_eq!((fault.kind, fault.files.as_slice()), (FaultKind::PositionScale, &["run_1.csv".to_owned()][..]));
     let (_, mended) = mend(&model, &logs, &faults.faults);
     assert_eq!(find_faults(&model, &mended).faults, []);
+}
+
+#[test]
+fn efforts_that_one_log_cuts_off_are_told_and_left_out() {
+    let model = built_in("arm7");
+    let mut logs = logs(&model, 3, 3);
+    let most = logs[1].effort[1].iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    logs[1].effort[1].iter_mut().for_each(|x| *x = x.clamp(-0.5 * most, 0.5 * most));
+    let faults = find_faults(&model, &logs);
+    let [fault] = faults.faults.as_slice() else { panic!("{faults:#?}") };
+    assert_eq!((fault.kind, &fault.joints), (FaultKind::EffortClipped, &names(&model, &[1])));
+    assert!(fault.files == ["run_1.csv"] && !fault.mended, "{fault:#?}");
 }

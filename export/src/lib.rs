@@ -186,7 +186,7 @@ pub fn export(target: Target, robot: &Robot, corrected: &Corrected, logs: &[Epis
     ledger.paste = match target {
         Target::Urdf => paste::urdf(model, &totals),
         Target::Mjcf => paste::mjcf(model, &totals),
-        Target::IsaacLab | Target::C => Vec::new(),
+        Target::IsaacLab | Target::C | Target::Cpp | Target::Simulink | Target::Fmu => Vec::new(),
     };
     ledger.notes = notes(target, robot.dt, corrected, &totals);
     ledger.notes.extend(emptied.iter().map(|link| {

@@ -9,7 +9,6 @@ use crate::report::{figure, plain, rollout_page, significant};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use gapscope_diagnosis::{BoundGrowth, Contender, Corrected, ModelRollouts, RolloutOptions, rollouts};
-use gapscope_dynamics::Model;
 use indicatif::ProgressBar;
 use std::fmt::Write;
 use std::path::PathBuf;

@@ -37,7 +37,7 @@ pub fn of(evidence: &Evidence, effects: &[FoundEffect]) -> Vec<EffectCurve> {
         }
         curve
     };
-    let mut curves: Vec<Curve> = evidence.curves.iter().map(with_band).collect();
+    let mut curves: Vec<EffectCurve> = evidence.curves.iter().map(with_band).collect();
     // In the order of the table of effects.
     curves.sort_by_key(|curve| effects.iter().position(|effect| effect.kind == curve.kind).unwrap_or(usize::MAX));
     curves

@@ -24,7 +24,6 @@ const SETTLED_MISFIT: f64 = 1.0;
 const HALVINGS: usize = 3;
 
 /// What the effects of a fit change of the residual, and the coefficients of the columns that stand for it.
-#[derive(Default)]
 pub struct Bend {
     /// `[episode][joint][signal]`, N m or N.
     change: Vec<Vec<Vec<f64>>>,
@@ -148,6 +147,44 @@ impl Data<'_> {
             .collect()
     }
 
+    /// What a fit changes of the residual, and the misfit that the plant has there.
+    fn look(&self, problem: &Problem, at: &Fit) -> Result<(Bend, f64), EffectError> {
+        let bend = self.bend(problem, at)?;
+        let mut there = problem.clone();
+        self.bent(&mut there, &at.set, &bend);
+        let misfit = there.misfit(at, self.band);
+        Ok((bend, misfit))
+    }
+
+    /// A fit moved to where the plant leaves less than at the point reached last, with what it changes there and its misfit;
+    /// `None` where there is no way down. A drive that turns on its own bends so much that a whole step may lead away, or fall
+    /// far short: the step is halved, or taken twice.
+    fn down(
+        &self,
+        problem: &Problem,
+        at: &mut Fit,
+        last: Option<&Reached>,
+    ) -> Result<Option<(Bend, f64)>, EffectError> {
+        let mut here = self.look(problem, at)?;
+        let Some(last) = last else { return Ok(Some(here)) };
+        if here.1 < last.misfit {
+            let mut farther = at.clone();
+            farther.move_to(problem, &last.coefficients, -1.0);
+            let there = self.look(problem, &farther)?;
+            if there.1 < here.1 {
+                (*at, here) = (farther, there);
+            }
+        }
+        for _ in 0..HALVINGS {
+            if here.1 <= last.misfit {
+                break;
+            }
+            at.move_to(problem, &last.coefficients, 0.5);
+            here = self.look(problem, at)?;
+        }
+        Ok((here.1 <= last.misfit).then_some(here))
+    }
+
     /// The problem of some candidates alone, linear about the parameters that fit best, and the fit (Gauss–Newton in the
     /// knobs, chords in what else bends; friction under load about the load that [`Data::loaded`] tells).
     ///
@@ -192,14 +229,12 @@ impl Data<'_> {
                 }
             }
             if round >= most || (round >= least && change < SETTLED && settled) {
-                let mut problem = problem;
-                if let Some(last) = &reached {
-                    let mut there = problem.clone();
-                    data.bent(&mut there, &set, &data.bend(&problem, &fit)?);
-                    if there.misfit(&fit, self.band) > last.misfit {
-                        fit.move_to(&problem, &last.coefficients, 1.0);
-                    }
+                if let Some(last) = &reached
+                    && data.look(&problem, &fit)?.1 > last.misfit
+                {
+                    fit.move_to(&problem, &last.coefficients, 1.0);
                 }
+                let mut problem = problem;
                 data.break_away(&mut problem, &fit)?;
                 problem.split(self.band);
                 return Ok((problem, fit));
@@ -215,45 +250,17 @@ impl Data<'_> {
                 loaded = Some(self.loaded(&problem, &at)?);
             }
             let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
-            let mut bend = Bend::default();
-            if turns {
-                // What turns on its own bends so much that a whole step may lead away, or fall far short.
-                let mut there = problem.clone();
-                let mut look = |at: &Fit| -> Result<(Bend, f64), EffectError> {
-                    let bend = data.bend(&problem, at)?;
-                    data.bent(&mut there, &set, &bend);
-                    Ok((bend, there.misfit(at, self.band)))
-                };
-                let (mut here, mut misfit) = look(&at)?;
-                if let Some(last) = &reached {
-                    let mut farther = at.clone();
-                    farther.move_to(&problem, &last.coefficients, -1.0);
-                    if misfit < last.misfit {
-                        let (bend, left) = look(&farther)?;
-                        if left < misfit {
-                            (at, here, misfit) = (farther, bend, left);
-                        }
-                    }
-                    for _ in 0..HALVINGS {
-                        if misfit <= last.misfit {
-                            break;
-                        }
-                        at.move_to(&problem, &last.coefficients, 0.5);
-                        (here, misfit) = look(&at)?;
-                    }
-                    settled = last.misfit - misfit < SETTLED_MISFIT;
-                }
-                if settled && reached.as_ref().is_some_and(|last| misfit > last.misfit) {
-                    // No way down from where it is.
-                    round = ROUNDS_OF_TURNING;
+            let bend = if turns {
+                let Some((bend, misfit)) = data.down(&problem, &mut at, reached.as_ref())? else {
+                    round = most;
                     continue;
-                }
-                bend = here;
+                };
+                settled = reached.as_ref().is_some_and(|last| last.misfit - misfit < SETTLED_MISFIT);
                 reached = Some(Reached { misfit, coefficients: at.coefficients(&problem) });
-            }
-            if !turns {
-                bend = data.bend(&problem, &at)?;
-            }
+                bend
+            } else {
+                data.bend(&problem, &at)?
+            };
             found = Some(bend);
             round += 1;
         }

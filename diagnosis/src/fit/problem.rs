@@ -7,7 +7,6 @@ mod score;
 mod solve;
 mod weigh;
 
-use crate::fit::estimate::Fit;
 use crate::fit::terms::{Entry, Term};
 use crate::record::band::Band;
 use crate::record::frequency::{Equalizer, in_bands};
@@ -240,23 +239,6 @@ impl Problem {
             let rotor = entry.candidate.rotor;
             entry.columns.clone().take(1).for_each(|c| self.bounds[c] = (rotor, rotor));
         }
-    }
-
-    /// Sum over the joints of the mean logarithm of what a fit leaves of each block of time, each joint by its rows: a burst
-    /// that no law of the catalogue hits counts as one block that is off.
-    pub fn misfit(&self, fit: &Fit, band: &Band) -> f64 {
-        let of = |(j, joint): (usize, &JointRows)| {
-            let mut blocks = vec![(0.0, 0.0); band.blocks];
-            for (row, rest) in joint.rows.iter().zip(joint.residual(&fit.columns, &fit.theta)) {
-                let (sum, count) = &mut blocks[band.rows[*row].block];
-                *sum += rest * rest;
-                *count += 1.0;
-            }
-            let used: Vec<f64> =
-                blocks.iter().filter(|b| b.1 > 0.0).map(|b| (b.0 / b.1 + self.least_noise(j)).ln()).collect();
-            joint.rows.len() as f64 * used.iter().sum::<f64>() / used.len().max(1) as f64
-        };
-        self.joints.iter().enumerate().map(of).sum()
     }
 
     /// Number of blocks that hold rows.

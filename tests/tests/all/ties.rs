@@ -48,7 +48,7 @@ fn a_load_of_many_times_its_link_is_none_of_the_link() {
     let scale = |x: &[f64]| -> Vec<f64> { x.iter().map(|x| 0.06 * x).collect() };
     let link = |joint: &gapscope_dynamics::Joint| {
         let body = &joint.inertia;
-        let six = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)].map(|(i, j)| body.inertia.col(j)[i]);
+        let six = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)].map(|(i, j)| body.rotational.col(j)[i]);
         Effect::LinkInertiaError(LinkInertiaError {
             joint: joint.name.clone(),
             mass_delta: 0.06 * body.mass,

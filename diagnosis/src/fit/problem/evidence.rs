@@ -95,6 +95,23 @@ impl Problem {
         self.joints.iter().map(|joint| mean_square(joint.residual(&fit.columns, &fit.theta))).collect()
     }
 
+    /// Sum over the joints of the mean logarithm of what a fit leaves of each block of time, each joint by its rows: a burst
+    /// that no law of the catalogue hits counts as one block that is off.
+    pub fn misfit(&self, fit: &Fit, band: &Band) -> f64 {
+        let of = |(j, joint): (usize, &super::JointRows)| {
+            let mut blocks = vec![(0.0, 0.0); band.blocks];
+            for (row, rest) in joint.rows.iter().zip(joint.residual(&fit.columns, &fit.theta)) {
+                let (sum, count) = &mut blocks[band.rows[*row].block];
+                *sum += rest * rest;
+                *count += 1.0;
+            }
+            let used: Vec<f64> =
+                blocks.iter().filter(|b| b.1 > 0.0).map(|b| (b.0 / b.1 + self.least_noise(j)).ln()).collect();
+            joint.rows.len() as f64 * used.iter().sum::<f64>() / used.len().max(1) as f64
+        };
+        self.joints.iter().enumerate().map(of).sum()
+    }
+
     /// What logs say for an account at its exact law, as good as the whole problem is linear about it (Laplace). What is left
     /// has heavy tails, so that neither a glitch nor a blow decides, and a level of its own in each band of frequencies
     /// (Whittle, Arkiv för Matematik 2(23) 1953): noise at some of them does not drown what the others say.

@@ -9,7 +9,7 @@ use crate::record::logs::{Progress, Record};
 use crate::search::chosen::{Chosen, Turned, with_drive};
 use crate::search::climb;
 use crate::search::converge::weighing;
-use gapscope_effects::{Candidate, EffectError, Kind};
+use gapscope_effects::{Candidate, EffectError};
 
 /// Accounts of drives that are tried in each pass.
 const ACCOUNTS: usize = 2;
@@ -26,25 +26,33 @@ impl Record<'_> {
         if joints.is_empty() {
             return Ok(rigid);
         }
-        let further = |kind: Kind| !kind.is_calibration();
-        let calibrated = if climb::kinds(&rigid.all, &rigid.choice.set).into_iter().any(further) {
-            Some(self.calibrated(&rigid, progress)?)
-        } else {
-            None
+        // Beside what was found, beside its calibration alone, fitted anew without rotors, and beside the best calibration.
+        let without_rotors = |of: &Chosen| {
+            let entries = &of.exact.entries;
+            let beside = (0..entries.len()).filter(|&i| !entries[i].candidate.kind.card().rotor).collect();
+            (of.exact.clone(), Fit { set: beside, ..of.fit.clone() })
         };
-        let bases = [(Some(&rigid), false), (calibrated.as_ref(), false), (Some(&rigid), true)];
+        let mut bases = vec![(without_rotors(&rigid), rigid.choice.clone(), false)];
+        if climb::kinds(&rigid.all, &rigid.choice.set).into_iter().any(|kind| !kind.is_calibration()) {
+            let calibration = |c: &&Candidate| c.kind.is_calibration() && !c.kind.card().rotor;
+            let bodies: Vec<Candidate> =
+                rigid.exact.entries.iter().map(|e| &e.candidate).filter(calibration).cloned().collect();
+            let mut choice = rigid.choice.clone();
+            choice.set.retain(|&c| rigid.all.entries[c].candidate.kind.is_calibration());
+            bases.push((self.data(&rigid.noise).refine(&bodies)?, choice, false));
+            let calibrated = self.calibrated(&rigid, progress)?;
+            bases.push((without_rotors(&calibrated), calibrated.choice, false));
+        }
+        bases.push((without_rotors(&rigid), rigid.choice.clone(), true));
         let mut best: Option<Chosen> = None;
         let mut tried: Vec<(Candidate, f64)> = Vec::new();
-        for (base, through) in bases.into_iter().filter_map(|(base, through)| Some((base?, through))) {
+        for (others, base, through) in bases {
             if through && best.is_some() {
                 break;
             }
-            let entries = &base.exact.entries;
-            let beside = (0..entries.len()).filter(|&i| !entries[i].candidate.kind.card().rotor).collect();
-            let others = (base.exact.clone(), Fit { set: beside, ..base.fit.clone() });
             for account in self.accounts(&joints, &others.0, &others.1, through)?.into_iter().take(ACCOUNTS) {
                 let (all, place) = self.with_rotor(&rigid, account.drive.joints[0]);
-                let mut choice = base.choice.clone();
+                let mut choice = base.clone();
                 choice.set.push(place);
                 choice.set.sort_unstable();
                 choice.set.dedup();

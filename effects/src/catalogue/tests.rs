@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::candidate::Range;
-use crate::card::{Apart, Force, Grid, Part, Place, Size, Turned};
+use crate::card::{Apart, Grid, Part, Place, Size, Turned};
 use gapscope_dynamics::robots;
 
 fn robot() -> Model {

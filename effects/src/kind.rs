@@ -51,6 +51,14 @@ pub enum Kind {
     JointZeroOffset,
     /// An outside force for some of the time.
     ExternalContact,
+    /// A servo's proportional gain differs from the one given.
+    ServoGainError,
+    /// A servo's derivative gain or back-EMF differs from the one given.
+    ServoDampingError,
+    /// The drive does not turn faster.
+    SpeedLimit,
+    /// A servo does nothing within a small error.
+    DeadBand,
     /// Outside the catalogue: drag of a medium on a link.
     LinkDrag,
     /// Outside the catalogue: drag in a joint, of a power of its speed.
@@ -89,6 +97,10 @@ impl Kind {
         Kind::ExternalContact,
         Kind::JointCoupling,
     ];
+
+    /// The kinds of servo arms, against a drive that was given. They belong to set points, so that no [`crate::Effect`], which
+    /// acts on efforts, is of such a kind.
+    pub const SERVO: [Kind; 4] = [Kind::ServoGainError, Kind::ServoDampingError, Kind::SpeedLimit, Kind::DeadBand];
 
     /// The kinds that have a linear signature, so that a [`crate::Candidate`] can be one; in the order of the catalogue.
     pub const LINEAR: [Kind; 10] = [
@@ -155,6 +167,10 @@ impl Kind {
             Kind::Backlash => "backlash",
             Kind::JointZeroOffset => "joint_zero_offset",
             Kind::ExternalContact => "external_contact",
+            Kind::ServoGainError => "servo_gain_error",
+            Kind::ServoDampingError => "servo_damping_error",
+            Kind::SpeedLimit => "speed_limit",
+            Kind::DeadBand => "dead_band",
             Kind::LinkDrag => "link_drag",
             Kind::JointDrag => "joint_drag",
             Kind::Swing => "swing",
@@ -176,7 +192,7 @@ mod tests {
 
     #[test]
     fn the_name_is_the_one_that_serde_writes() {
-        for kind in Kind::ALL.into_iter().chain(Kind::OUTSIDE) {
+        for kind in Kind::ALL.into_iter().chain(Kind::SERVO).chain(Kind::OUTSIDE) {
             assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
         }
     }

@@ -41,6 +41,7 @@ mod screen;
 mod search;
 mod signals;
 mod structure;
+mod sums;
 #[cfg(test)]
 mod support;
 mod verdict;
@@ -51,3 +52,4 @@ pub use evaluate::{Predictions, evaluate, torque_changes};
 pub use experiment::FILE as NEXT_EXPERIMENT;
 pub use gapscope_effects::EncoderSide;
 pub use rollout::{BoundGrowth, Contender, ModelRollouts, RolloutError, RolloutOptions, rollouts};
+pub use sums::{Place, Sums, SumsError};

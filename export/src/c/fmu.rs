@@ -30,7 +30,7 @@ pub struct Fmu {
     pub note: String,
 }
 
-/// Packs `code`, which [`super::write`] made for steps of `dt` (s), and the weights of a residual, if there is one.
+/// Packs `code`, which `super::write` made for steps of `dt` (s), and the weights of a residual, if there is one.
 ///
 /// # Errors
 /// A folder for the compiler that cannot be made.

@@ -118,6 +118,11 @@ impl Candidate {
         kinds.flat_map(at).collect()
     }
 
+    /// A signal, `dt` s from sample to sample, as a law that acts late passes it on; as it is for any other.
+    pub fn passed_on(&self, signal: &[f64], dt: f64) -> Vec<f64> {
+        self.kind.card().passes.map_or_else(|| signal.to_vec(), |passes| passes(signal, self.shape, dt))
+    }
+
     /// Whether it is a drive that turns on its own: a spring or play.
     pub fn turns(&self) -> bool {
         self.kind.card().turning.is_some()

@@ -18,6 +18,8 @@ pub struct Card {
     pub knob: Option<Knob>,
     /// The force that it accounts for: a joint has one account of it.
     pub force: Option<Force>,
+    /// How it passes the effort on, where it says how late that acts.
+    pub passes: Option<Passes>,
     /// Other kinds that it cannot stand beside at the same joints.
     pub excludes: &'static [Kind],
     /// What is asked for as its least size that logs would have shown.
@@ -88,6 +90,9 @@ pub enum Place {
     /// At each joint together with its parent.
     Pair,
 }
+
+/// What passes a signal on: its samples, how late, and the time from sample to sample, both s.
+pub type Passes = fn(&[f64], f64, f64) -> Vec<f64>;
 
 /// A force that several kinds account for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -243,6 +248,7 @@ impl Card {
         place: Place::Joint,
         knob: None,
         force: None,
+        passes: None,
         excludes: &[],
         size: Size::Unasked,
         axis: Axis::Prediction,
@@ -272,7 +278,7 @@ impl Card {
 
     /// Whether it says how late the effort acts.
     pub fn is_late(&self) -> bool {
-        self.force == Some(Force::Late)
+        self.passes.is_some()
     }
 
     /// Whether its knob is a choice, where it has one: it stays as it is.

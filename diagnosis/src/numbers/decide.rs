@@ -56,6 +56,13 @@ pub const BODIES_PULL: f64 = 0.01;
 /// What a law makes of noise is known to this part: how much of it is the position's and how much the effort's, how white.
 pub const FILTER_KNOWN_TO: f64 = 0.15;
 
+/// No drive is a delay or a lag exactly: standard error, at least, of the part of their difference that is left.
+pub const LATE_KNOWN_TO: f64 = 0.15;
+
+/// Part of its square that noise may have of the torque by which a delay is told from a lag: a servo answers to the noise of
+/// the position, and that answer is in what is left as well.
+pub const NOISE_IN_INSTRUMENT: f64 = 0.01;
+
 /// A torque this many times its noise is no artefact of it: a limit of a drive may cut it.
 pub const CLEAR_OF_NOISE: f64 = 8.0;
 

@@ -1,9 +1,24 @@
-//! Whether effort acts after a delay or through a lag: both at their exact law, by the odds that decide everywhere.
+//! Whether effort acts after a delay or through a lag.
+//!
+//! Both laws take the measured effort for their input. A lag smooths its noise, and a servo answers to the noise of the position:
+//! what the laws leave therefore differs by noise as much as by the laws. So they are not compared by the size of what
+//! they leave but by how much of it goes with their difference on a torque without that noise, the one that the motion takes
+//! by the model, smoothed (instrumental variables; Söderström and Stoica, Instrumental Variable Methods for System
+//! Identification, 1983).
 
-use crate::record::logs::Record;
+use crate::numbers::decide::{LATE_KNOWN_TO, NOISE_IN_INSTRUMENT};
+use crate::record::data::Data;
+use crate::record::logs::{PART_OF_NOISE, Record};
+use crate::record::rows::{Rows, at_rows};
+use crate::record::signals::Signals;
 use crate::search::chosen::{Chosen, with_drive};
 use crate::search::climb::Choice;
-use gapscope_effects::EffectError;
+use gapscope_effects::{Candidate, EffectError};
+
+/// Time constants of the lags that the torque may be smoothed by, once each way, s.
+const SMOOTHED_BY: [f64; 5] = [0.2, 0.1, 0.05, 0.025, 0.0125];
+/// Relative step of a delay for what a little more of it would change.
+const LATER: f64 = 0.01;
 
 impl Record<'_> {
     /// The choice with the likelier of delay and lag where it has one of them, and the probability that it is the other.
@@ -21,11 +36,144 @@ impl Record<'_> {
         set.sort_unstable();
         let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
         let rival = chosen.with(Choice { set }, exact, fit);
-        let odds = chosen.odds_against(&rival, self)?;
-        let (mut likelier, lost) = if odds >= 0.0 { (chosen, other) } else { (rival, lost) };
+        let odds = self.odds_of_the_second([&chosen, &rival])?;
+        let (mut likelier, lost) = if odds <= 0.0 { (chosen, other) } else { (rival, lost) };
         // What was decided here no climb turns round.
         likelier.all.closed.push(likelier.all.entries[lost].candidate.kind);
         likelier.late_doubt = Some(1.0 / (1.0 + odds.abs().exp()));
         Ok(likelier)
+    }
+
+    /// By how many nats the second of two accounts that differ by a delay and a lag is likelier.
+    fn odds_of_the_second(&self, accounts: [&Chosen; 2]) -> Result<f64, EffectError> {
+        let law =
+            |of: &Chosen| of.exact.entries.iter().map(|e| &e.candidate).find(|c| c.kind.card().is_late()).cloned();
+        let [Some(first), Some(second)] = accounts.map(law) else { return Ok(0.0) };
+        let n = self.model.dof();
+        let rests =
+            [at_rows(&self.band, &self.rest(accounts[0])?, n), at_rows(&self.band, &self.rest(accounts[1])?, n)];
+        let size = |j: usize| {
+            let of = |rest: &Rows| rest[j].iter().map(|r| r * r).sum::<f64>();
+            if self.moving[j] { of(&rests[0]).min(of(&rests[1])) } else { 0.0 }
+        };
+        // Each joint counts by what is left of it.
+        let sizes: Vec<f64> = (0..n).map(size).collect();
+        let instrument = self.instrument(accounts[0], [&first, &second], &sizes)?;
+        let mut sums = vec![(0.0, 0.0); self.band.blocks];
+        for (j, size) in sizes.iter().enumerate().filter(|(_, size)| **size > 0.0) {
+            for (i, row) in self.band.rows.iter().enumerate() {
+                let (left, between) = &mut sums[row.block];
+                *left += instrument[j][i] * rests[0][j][i] / size;
+                *between += instrument[j][i] * (rests[0][j][i] - rests[1][j][i]) / size;
+            }
+        }
+        Ok(odds_of_the_second(&sums))
+    }
+
+    /// What the first of two laws makes of the torque that the motion takes less what the second does, at the rows of the band.
+    /// The torque is smoothed until noise is a small part of that. What a little more or less of the delay would change is
+    /// taken out: noise shifts both laws.
+    fn instrument(&self, of: &Chosen, laws: [&Candidate; 2], sizes: &[f64]) -> Result<Rows, EffectError> {
+        let n = self.model.dof();
+        let taken = |signals: &[Signals]| Data { signals, ..self.data(&of.noise) }.loaded(&of.exact, &of.fit);
+        let (plain, noisier) = (taken(&self.signals)?, taken(&self.noisier)?);
+        let later = Candidate { shape: laws[0].shape * (1.0 + LATER), ..laws[0].clone() };
+        let mut instrument = Rows::new();
+        for smoothed_by in SMOOTHED_BY {
+            let rows = |signals: &[Signals], laws: [&Candidate; 2]| {
+                let of = |s: &Signals| -> Vec<Vec<f64>> {
+                    let joints = s.taken.iter().flatten();
+                    joints.map(|torque| difference(&smoothed(torque, smoothed_by, s.dt), laws, s.dt)).collect()
+                };
+                at_rows(&self.band, &signals.iter().map(of).collect::<Vec<_>>(), n)
+            };
+            let mut next = rows(&plain, laws);
+            if noisier.len() == plain.len() && !instrument.is_empty() {
+                let mut noise = rows(&noisier, laws);
+                noise.iter_mut().zip(&next).for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a -= b));
+                let part = dot(&noise, &noise, sizes) / dot(&next, &next, sizes) / PART_OF_NOISE.powi(2);
+                if part > NOISE_IN_INSTRUMENT {
+                    break;
+                }
+            }
+            let tangent = rows(&plain, [laws[0], &later]);
+            let part = dot(&next, &tangent, sizes) / dot(&tangent, &tangent, sizes).max(f64::MIN_POSITIVE);
+            next.iter_mut().zip(&tangent).for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a -= part * b));
+            instrument = next;
+        }
+        Ok(instrument)
+    }
+}
+
+/// Nats for the second of two laws by blocks of time: what goes with their difference of what the first leaves, and of what
+/// the first leaves and the second does not.
+fn odds_of_the_second(blocks: &[(f64, f64)]) -> f64 {
+    let (left, between) = blocks.iter().fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
+    if between == 0.0 {
+        return 0.0;
+    }
+    // Part of the difference that the first leaves: 0 where it is right, 1 where the second is.
+    let part = left / between;
+    let error = blocks.iter().map(|(l, b)| (l - part * b).powi(2)).sum::<f64>().sqrt() / between.abs();
+    // What lies beyond both laws shows by how much they are off.
+    let beyond = part - part.clamp(0.0, 1.0);
+    (2.0 * part - 1.0) / (2.0 * error.hypot(LATE_KNOWN_TO).max(beyond.abs()).powi(2))
+}
+
+/// A torque through a lag, once each way, so that nothing comes later.
+fn smoothed(torque: &[f64], time: f64, dt: f64) -> Vec<f64> {
+    let pass = -(-dt / time).exp_m1();
+    let mut smooth = torque.to_vec();
+    for _ in 0..2 {
+        let mut y = smooth.first().copied().unwrap_or(0.0);
+        for x in &mut smooth {
+            y += pass * (*x - y);
+            *x = y;
+        }
+        smooth.reverse();
+    }
+    smooth
+}
+
+/// What the first of two laws makes of a torque less what the second does.
+fn difference(torque: &[f64], laws: [&Candidate; 2], dt: f64) -> Vec<f64> {
+    let [first, second] = laws.map(|law| law.passed_on(torque, dt));
+    first.iter().zip(second).map(|(a, b)| a - b).collect()
+}
+
+/// Sum of the products of rows, each joint by one over its size; joints without one count nothing.
+fn dot(a: &Rows, b: &Rows, sizes: &[f64]) -> f64 {
+    let of = |((a, b), size): ((&Vec<f64>, &Vec<f64>), &f64)| {
+        if *size > 0.0 { a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / size } else { 0.0 }
+    };
+    a.iter().zip(b).zip(sizes).map(of).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_law_is_likelier_that_leaves_nothing_of_the_difference() {
+        let blocks = |part: f64| -> Vec<(f64, f64)> {
+            (0..20).map(|i| (part + 0.1 * f64::from(2 * (i % 2) - 1), 1.0)).collect()
+        };
+        let odds = |part: f64| odds_of_the_second(&blocks(part));
+        assert!(odds(0.0) < -15.0 && odds(1.0) > 15.0, "{} {}", odds(0.0), odds(1.0));
+        assert!(odds(0.5).abs() < 1e-9, "half of the difference is neither");
+        // Twice the difference is beyond both laws, and so may be what lies between them.
+        assert!(odds(2.0) > 0.0 && odds(2.0) < odds(1.0), "{}", odds(2.0));
+        assert_eq!(odds_of_the_second(&[(1.0, 0.0); 5]), 0.0);
+        // Blocks that do not agree say little.
+        let split: Vec<(f64, f64)> = (0..20).map(|i| (if i % 2 == 0 { 4.0 } else { -4.0 }, 1.0)).collect();
+        assert!(odds_of_the_second(&split).abs() < 1.0);
+    }
+
+    #[test]
+    fn smoothing_makes_nothing_later() {
+        let bump: Vec<f64> = (0..2001).map(|k| (-(f64::from(k) - 1000.0).powi(2) / 2e4).exp()).collect();
+        let smooth = smoothed(&bump, 0.05, 0.002);
+        let centre = |x: &[f64]| x.iter().enumerate().map(|(k, x)| k as f64 * x).sum::<f64>() / x.iter().sum::<f64>();
+        assert!((centre(&smooth) - 1000.0).abs() < 0.1 && smooth[1000] < bump[1000], "{}", centre(&smooth));
     }
 }

@@ -4,7 +4,7 @@
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), chapter 5 (the drive's current loop).
 
 use crate::card::{Card, Force, Gauge, LATE, LATE_EXACT_TO, LATE_SPREAD, Place, Size};
-use crate::filter::first_derivative;
+use crate::filter::{first_derivative, first_order};
 use crate::law::{Law, Listed, Signature, Value, check};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
 use gapscope_dynamics::Model;
@@ -51,6 +51,7 @@ impl Signature for ActuatorLag {
         place: Place::Robot,
         knob: Some(LATE),
         force: Some(Force::Late),
+        passes: Some(first_order),
         size: Size::Along(&[Gauge::along("time_constant", &[1.0])]),
         exact_to_samples: LATE_EXACT_TO,
         reads_torque: true,

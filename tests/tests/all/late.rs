@@ -34,7 +34,6 @@ fn a_lag_in_noisy_effort() {
 }
 
 #[test]
-#[ignore = "a delay is named without the tie since the exact odds decide: issue 23"]
 fn a_short_lag_is_no_delay_for_certain_where_a_servo_answers_to_noise() {
     // A servo's answer to the noise of the position goes with that noise, and so would speak for a delay.
     let found = found(&Effect::ActuatorLag(ActuatorLag { time_constant: 0.0058 }), 1e-5);

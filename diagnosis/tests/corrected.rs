@@ -68,6 +68,7 @@ fn sample(model: &Model, seed: u64) -> Corrected {
             link: "joint6".into(),
             intervals: vec![[0.1, 0.7 / 3.0], [1.0, 2.0]],
             force: [20.0 / 3.0, -0.0, 1.0],
+            offset: [0.01, 0.0, -0.02],
         }),
     ];
     Corrected {

@@ -33,6 +33,8 @@ pub struct Candidate {
     pub side: EncoderSide,
     /// Standard error of the knob of elasticity or play, which is known by other means than a fit of columns; 0 elsewhere.
     pub knob_error: f64,
+    /// The force of a contact as it is known so far, N, in the world frame: its point of attack is found about it.
+    pub force: [f64; 3],
 }
 
 /// What a joint does in the logs: the range in which knobs are looked for.
@@ -53,7 +55,8 @@ pub struct Range {
 impl Candidate {
     /// A candidate without a knob, on the link's side.
     pub fn new(kind: Kind, joints: Vec<usize>) -> Candidate {
-        Candidate { kind, joints, shape: 0.0, inertia: 0.0, rotor: 0.0, side: EncoderSide::Link, knob_error: 0.0 }
+        let (shape, side, force) = (0.0, EncoderSide::Link, [0.0; 3]);
+        Candidate { kind, joints, shape, inertia: 0.0, rotor: 0.0, side, knob_error: 0.0, force }
     }
 
     /// Its joint, where it has one alone.

@@ -281,7 +281,7 @@ pub(crate) fn draw(
             let intervals: Vec<Vec<[f64; 2]>> = (0..episodes).map(|_| episode()).collect();
             let contact = |intervals: &Vec<[f64; 2]>| {
                 let (link, intervals) = (robot.joint(n - 1), intervals.clone());
-                Effect::ExternalContact(ExternalContact { link, intervals, force })
+                Effect::ExternalContact(ExternalContact { link, intervals, force, offset: [0.0; 3] })
             };
             contacts = intervals.iter().map(contact).collect();
             (all, json!({ "force": force, "bursts": 3, "intervals": intervals }), vec![])

@@ -6,6 +6,7 @@ use crate::record::known::Known;
 use crate::record::signals::{Signals, standstill};
 use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
+use gapscope_effects::Candidate;
 use rayon::prelude::*;
 
 /// Part of its noise that a second run has once more: so little that play hits its stops as it did.
@@ -35,6 +36,8 @@ pub struct Record<'a> {
     pub moving: Vec<bool>,
     /// Columns that are the same in every problem of these logs.
     pub known: Known,
+    /// What may have pushed from outside, with its force as far as it is known.
+    pub contacts: Vec<Candidate>,
 }
 
 impl<'a> Record<'a> {
@@ -50,7 +53,8 @@ impl<'a> Record<'a> {
             moving[j] = false;
         }
         let band = Band::new(&signals);
-        Record { model, signals, noisier, band, still, moving, known: Known::default() }
+        let contacts = Candidate::contacts(model);
+        Record { model, signals, noisier, band, still, moving, known: Known::default(), contacts }
     }
 
     /// What a problem is made from; `noise` is the noise floor of each joint.

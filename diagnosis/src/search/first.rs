@@ -43,7 +43,7 @@ impl Record<'_> {
         candidates.extend(screen::places(&data, &ranges, &residuals, &outside));
         candidates.extend(outside);
         if self.signals.iter().any(|s| !s.pushed.is_empty()) {
-            candidates.extend(Candidate::contacts(self.model));
+            candidates.extend(self.contacts.iter().cloned());
         }
         let mut all = data.problem(candidates.iter().map(term).collect(), &weighing());
         progress("choosing effects", 0.2);

@@ -15,6 +15,16 @@ use rayon::prelude::*;
 /// Times, at most, that what pushes and what the robot lacks are told apart, each beside the other.
 const LOOKS: usize = 3;
 
+/// What is left beside pushes, and what these show.
+struct Beside {
+    /// What the commonest candidates leave of the logs, pushes left in it.
+    left: Left,
+    /// Torque of the force that the pushes show if it were always there.
+    always: Rows,
+    /// The contacts, each with that force.
+    contacts: Vec<Candidate>,
+}
+
 impl Record<'_> {
     /// Marks the stretches of time that stand out of what the commonest candidates leave.
     pub(crate) fn look_for_pushes(&mut self) -> Result<(), EffectError> {
@@ -29,7 +39,7 @@ impl Record<'_> {
         let mut pushed =
             contact::stretches(&self.signals, &self.band, &Left { noise: contact::noise(&bare), rest: bare });
         if pushed.iter().all(Vec::is_empty) {
-            let (left, _) = self.left_beside_pushes(&noise);
+            let left = self.left_beside_pushes(&noise).left;
             pushed = contact::stretches(&self.signals, &self.band, &left);
         }
         // What pushes and what the robot itself lacks are told apart by turns: both stand out of a nominal model.
@@ -40,21 +50,21 @@ impl Record<'_> {
             if none || as_before || look == LOOKS {
                 break;
             }
-            let (left, always) = self.left_beside_pushes(&noise);
+            let Beside { left, always, contacts } = self.left_beside_pushes(&noise);
             pushed = contact::of_one_force(&self.signals, &self.band, &left, &always);
+            self.contacts = contacts;
         }
         Ok(())
     }
 
-    /// What the commonest candidates leave of the logs beside the pushes known so far, these left in it, and the torque of
-    /// the force that these show if it were always there.
-    fn left_beside_pushes(&self, noise: &[f64]) -> (Left, Rows) {
+    /// The commonest candidates fitted beside the pushes known so far.
+    fn left_beside_pushes(&self, noise: &[f64]) -> Beside {
         let kinds: Vec<Kind> =
             Kind::ALL.into_iter().filter(|kind| kind.card().common || kind.card().of_its_log).collect();
         let mut candidates = Candidate::all(self.model);
         candidates.retain(|c| c.kind.card().common);
         if self.signals.iter().any(|s| !s.pushed.is_empty()) {
-            candidates.extend(Candidate::contacts(self.model));
+            candidates.extend(self.contacts.iter().cloned());
         }
         let terms = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
         let problem = self.data(noise).problem(terms, &kinds);
@@ -93,6 +103,12 @@ impl Record<'_> {
         };
         let (rest, still) = (at_rows(&rest), at_rows(&still));
         let always = at_rows(&|s| torque(s, &pushes));
-        (Left::new(rest, &still, &holds), always)
+        let mut contacts = self.contacts.clone();
+        for contact in &mut contacts {
+            let own = problem.entries.iter().find(|e| e.candidate.joints == contact.joints && pushes(e));
+            let force = own.and_then(|e| theta[e.columns.clone()].first_chunk());
+            contact.force = force.copied().unwrap_or(contact.force);
+        }
+        Beside { left: Left::new(rest, &still, &holds), always, contacts }
     }
 }

@@ -1,6 +1,7 @@
 //! An outside force for some of the time.
 //!
-//! M q̈ + C q̇ + g = τ + Jᵀ F inside the intervals, J the Jacobian of the link's centre of mass.
+//! M q̈ + C q̇ + g = τ + Jᵀ F inside the intervals, J the Jacobian of the point of the link at which the force acts. Where
+//! that is nobody knows to a centimetre, nor where the centre of mass of a used link is.
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 7.2 (contact forces in joint space).
 
 use crate::card::{Apart, Card, Place};
@@ -22,6 +23,16 @@ pub struct ExternalContact {
     pub intervals: Vec<[f64; 2]>,
     /// N, in the world frame, at the link's centre of mass.
     pub force: [f64; 3],
+    /// Where the force acts, m from the centre of mass of the model's link, along the axes of the link's frame.
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub offset: [f64; 3],
+}
+
+/// Standard deviation that an offset has before any log is seen, m.
+const OFFSET_SPREAD: f64 = 0.02;
+
+fn is_nothing(offset: &[f64; 3]) -> bool {
+    *offset == [0.0; 3]
 }
 
 impl Law for ExternalContact {
@@ -35,12 +46,19 @@ impl Law for ExternalContact {
 
     fn parameters(&self) -> Vec<Value> {
         let value = |name, value, unit| Value { name, joint: None, value, unit, unit_prismatic: unit };
-        vec![value("intervals", self.intervals.concat(), "s"), value("force", self.force.to_vec(), "N")]
+        let mut values =
+            vec![value("intervals", self.intervals.concat(), "s"), value("force", self.force.to_vec(), "N")];
+        if !is_nothing(&self.offset) {
+            values.push(value("offset", self.offset.to_vec(), "m"));
+        }
+        values
     }
 
     fn install(&self, plant: &mut Plant) -> Result<(), EffectError> {
-        for force in self.force {
-            check(self.kind(), "force", force, true, "a finite number")?;
+        for (name, values) in [("force", self.force), ("offset", self.offset)] {
+            for value in values {
+                check(self.kind(), name, value, true, "a finite number")?;
+            }
         }
         for &[from, to] in &self.intervals {
             check(self.kind(), "intervals", from, true, "a finite number")?;
@@ -48,7 +66,13 @@ impl Law for ExternalContact {
         }
         let named = plant.model().joints().iter().position(|joint| joint.link == self.link);
         let link = named.map_or_else(|| plant.joint(self.kind(), &self.link), Ok)?;
-        plant.contacts.push(Contact { link, force: DVec3::from_array(self.force), intervals: self.intervals.clone() });
+        let center = plant.model().joints()[link].inertia.center_of_mass().unwrap_or_default();
+        plant.contacts.push(Contact {
+            link,
+            force: DVec3::from_array(self.force),
+            point: center + DVec3::from_array(self.offset),
+            intervals: self.intervals.clone(),
+        });
         Ok(())
     }
 }
@@ -65,27 +89,35 @@ impl Signature for ExternalContact {
     };
 
     fn columns(candidate: &Candidate, motion: &Motion) -> Vec<Column> {
-        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j))
+        candidate.joint().map_or_else(Vec::new, |j| signature(motion, j, candidate.force))
+    }
+
+    fn scales(candidate: &Candidate, _model: &Model) -> Option<Vec<f64>> {
+        let offset = (!is_nothing(&candidate.force)).then_some([OFFSET_SPREAD; 3]);
+        Some([f64::INFINITY; 3].into_iter().chain(offset.into_iter().flatten()).collect())
     }
 }
 
 impl Listed for ExternalContact {
     fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<ExternalContact> {
-        let &[x, y, z] = coefficients else { return None };
+        let (&[x, y, z], offset) = coefficients.split_first_chunk()?;
+        let offset = offset.try_into().unwrap_or_default();
         let link = candidate.joints.first().map(|&j| model.joints()[j].name.clone()).unwrap_or_default();
-        Some(ExternalContact { link, intervals: Vec::new(), force: [x, y, z] })
+        Some(ExternalContact { link, intervals: Vec::new(), force: [x, y, z], offset })
     }
 }
 
 /// Three columns: what a unit force along x, y and z of the world at the link's centre of mass adds while it pushes, on
-/// every joint. Coefficients: the force.
-fn signature(motion: &Motion, link: usize) -> Vec<Column> {
+/// every joint. Coefficients: the force. Where that is known about, three more: what a force adds for each metre along x, y and z
+/// of the link that it acts off the centre of mass.
+fn signature(motion: &Motion, link: usize, force: [f64; 3]) -> Vec<Column> {
     let n = motion.model.dof();
     let mut data = Data::new(motion.model);
     let mut jacobian = DMatrix::zeros(6, n);
     let center = motion.model.joints()[link].inertia.center_of_mass().unwrap_or_default();
     let mut q = vec![0.0; n];
-    let mut columns: Vec<Column> = (0..3)
+    let offsets = if is_nothing(&force) { &[][..] } else { &DVec3::AXES[..] };
+    let mut columns: Vec<Column> = (0..3 + offsets.len())
         .map(|_| Column {
             rows: (0..n).map(|j| (j, vec![0.0; motion.len()])).collect(),
             at_least: f64::NEG_INFINITY,
@@ -99,9 +131,19 @@ fn signature(motion: &Motion, link: usize) -> Vec<Column> {
         }
         (0..n).for_each(|j| q[j] = motion.q[j][k]);
         motion.model.jacobian(&mut data, &q, link, center, &mut jacobian);
-        for (i, column) in columns.iter_mut().enumerate() {
+        let along = |jacobian: &DMatrix<f64>, j: usize| (0..3).map(|i| jacobian[(i, j)] * force[i]).sum::<f64>();
+        let at_center: Vec<f64> = (0..n).map(|j| along(&jacobian, j)).collect();
+        let (forces, points) = columns.split_at_mut(3);
+        for (i, column) in forces.iter_mut().enumerate() {
             for (j, row) in &mut column.rows {
                 row[k] = -jacobian[(i, *j)];
+            }
+        }
+        // The Jacobian is linear in the point.
+        for (offset, column) in offsets.iter().zip(points) {
+            motion.model.jacobian(&mut data, &q, link, center + *offset, &mut jacobian);
+            for (j, row) in &mut column.rows {
+                row[k] = at_center[*j] - along(&jacobian, *j);
             }
         }
     }

@@ -94,6 +94,8 @@ impl Ripple {
 pub(crate) struct Contact {
     pub(crate) link: usize,
     pub(crate) force: DVec3,
+    /// Where it acts, m, in the link's frame.
+    pub(crate) point: DVec3,
     pub(crate) intervals: Vec<[f64; 2]>,
 }
 

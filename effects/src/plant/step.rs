@@ -127,9 +127,8 @@ impl Plant {
         s.contact.fill(0.0);
         for contact in &self.contacts {
             let share = contact.share(time, time + self.dt);
-            let center = self.model.joints()[contact.link].inertia.center_of_mass().unwrap_or_default();
             if share > 0.0 {
-                self.model.jacobian(&mut self.data, &s.q[..n], contact.link, center, &mut s.jacobian);
+                self.model.jacobian(&mut self.data, &s.q[..n], contact.link, contact.point, &mut s.jacobian);
                 for (torque, column) in s.contact.iter_mut().zip(s.jacobian.column_iter()) {
                     *torque += share * (0..3).map(|i| column[i] * contact.force[i]).sum::<f64>();
                 }

@@ -183,16 +183,18 @@ fn a_zero_offset_shifts_the_measured_position() {
 }
 
 #[test]
-fn a_contact_pushes_at_the_centre_of_mass_inside_its_intervals_only() {
+fn a_contact_pushes_at_its_point_inside_its_intervals_only() {
     let model = robots::model("arm6").unwrap().unwrap().model;
     let n = model.dof();
     let q = [0.3, -0.8, 1.1, 0.2, -0.4, 0.6];
     let force = [3.0, -5.0, 8.0];
     let link = 3;
+    let offset = [0.03, -0.02, 0.05];
     let effect = Effect::ExternalContact(ExternalContact {
         link: model.joints()[link].link.clone(),
         intervals: vec![[1.0, 2.0], [3.0, 3.5 * DT + 3.0]],
         force,
+        offset,
     });
     let change = |time: f64, tau: &[f64]| {
         let mut plant = Plant::new(&model, std::slice::from_ref(&effect), DT).unwrap();
@@ -204,7 +206,7 @@ fn a_contact_pushes_at_the_centre_of_mass_inside_its_intervals_only() {
     let center = model.joints()[link].inertia.center_of_mass().unwrap();
     let mut data = gapscope_dynamics::Data::new(&model);
     let mut jacobian = nalgebra::DMatrix::zeros(6, n);
-    model.jacobian(&mut data, &q, link, center, &mut jacobian);
+    model.jacobian(&mut data, &q, link, center + glam::DVec3::from_array(offset), &mut jacobian);
     let push: Vec<f64> = (0..n).map(|j| (0..3).map(|i| jacobian[(i, j)] * force[i]).sum()).collect();
     let still = vec![0.0; n];
     for (time, share) in [(0.5, 0.0), (1.5, 1.0), (2.0, 0.0), (3.0 + 3.0 * DT, 0.5)] {

@@ -95,6 +95,11 @@ fn with_shape(kind: Kind, joints: Vec<usize>, shape: f64) -> Candidate {
     Candidate { shape, ..Candidate::new(kind, joints) }
 }
 
+/// A contact of the hand whose point is found about some force.
+fn pushed_by(force: [f64; 3]) -> Candidate {
+    Candidate { force, ..Candidate::new(Kind::ExternalContact, vec![5]) }
+}
+
 #[test]
 fn columns_with_a_knob_are_what_the_effect_adds() {
     let model = robot("arm6");
@@ -106,6 +111,7 @@ fn columns_with_a_knob_are_what_the_effect_adds() {
         (with_shape(Kind::TorqueRipple, vec![3], 12.0), vec![0.4, -0.3]),
         (with_shape(Kind::ActuationDelay, vec![], 0.0071), vec![0.0071]),
         (Candidate::new(Kind::ExternalContact, vec![5]), vec![5.0, -3.0, 8.0]),
+        (pushed_by([5.0, -3.0, 8.0]), vec![5.0, -3.0, 8.0, 0.02, -0.01, 0.03]),
     ] {
         let (worst, largest) = compare(&model, &candidate, &theta);
         // A push begins inside a sample for the plant and at one for its signature.

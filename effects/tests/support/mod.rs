@@ -111,6 +111,7 @@ pub fn all(joint: &str) -> Vec<Effect> {
             link: joint.to_owned(),
             intervals: vec![[1.0, 1.5], [3.0, 4.25]],
             force: [5.0, -3.0, 4.0],
+            offset: [0.01, -0.02, 0.03],
         }),
         Effect::JointCoupling(JointCoupling {
             joints: [joint.to_owned(), "joint2".to_owned()],

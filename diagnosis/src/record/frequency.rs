@@ -15,7 +15,7 @@ impl Equalizer {
     /// Rows of a joint, all those of a band, at the noise that both accounts have.
     pub fn apply(&self, band: &Band, joint: usize, rows: &mut [f64]) {
         let scale = self.0[joint];
-        if scale.iter().any(|scale| *scale < 1.0) {
+        if scale.iter().any(|scale| *scale != 1.0) {
             in_frequency(band, rows, |of| scale[of]);
         }
     }

@@ -50,25 +50,31 @@ impl Record<'_> {
                 s.tau[j].iter_mut().zip(backwards).for_each(|(tau, rest)| *tau += PART_OF_NOISE * part * rest);
             }
         }
-        let through = |i: usize| -> Result<Vec<[f64; BANDS]>, EffectError> {
+        let moved = |i: usize| -> Result<Vec<[f64; BANDS]>, EffectError> {
             let noisier = run(accounts[i].0, &noisier)?;
-            let of = |j: usize| {
-                let moved = self.levels(&less(&noisier[j], &plain[i][j]));
-                let left = [0, 1].map(|i: usize| self.levels(&plain[i][j]));
-                // Two runs of a play that hits its stops at other times differ by more than either leaves: that is no noise.
-                std::array::from_fn(|b| moved[b].min(left[0][b].max(left[1][b]) + PART_OF_NOISE.ln()))
-            };
-            Ok((0..n).map(of).collect())
+            Ok((0..n).map(|j| self.levels(&less(&noisier[j], &plain[i][j]))).collect())
         };
-        let through = [through(0)?, through(1)?];
+        let moved = [moved(0)?, moved(1)?];
+        let left = [0, 1].map(|i: usize| plain[i].iter().map(|rows| self.levels(rows)).collect::<Vec<_>>());
         let filters = [0, 1].map(|i: usize| accounts[i].0.filters_beyond(accounts[1 - i].0));
         let scale = |i: usize| {
             let of = |j: usize| {
+                let from_position = [0, 1].map(|i: usize| self.levels(&less(&of_position[i][j], &plain[i][j])));
                 std::array::from_fn(|b| {
-                    let less = through[1 - i][j][b] - through[i][j][b];
+                    let more = moved[i][j][b] - moved[1 - i][j][b];
+                    // Two runs of a play that hits its stops at other times differ by more than either leaves: that is no noise.
+                    let most = left[0][j][b].max(left[1][j][b]) + PART_OF_NOISE.ln();
+                    let bounded = moved[i][j][b].min(most) - moved[1 - i][j][b].min(most);
                     // In doubt for the account without the law.
-                    let doubt = if filters[1 - i] && !filters[i] { less.abs().min(FILTER_KNOWN_TO) } else { 0.0 };
-                    (less.min(0.0) - doubt).exp()
+                    let (more, doubt) = match [filters[i], filters[1 - i]] {
+                        [true, false] => (bounded.min(more), 0.0),
+                        [false, true] => (bounded.max(more), bounded.max(more).abs().min(FILTER_KNOWN_TO)),
+                        _ => (bounded, 0.0),
+                    };
+                    // The noise of the position is known. What leaves less than it must is no better for that: a light link that
+                    // jumps in a gap takes the noise for its motion.
+                    let bound = from_position[0][b].min(from_position[1][b]) - PART_OF_NOISE.ln();
+                    ((-more).min(0.0) - doubt).max(bound - left[i][j][b]).exp()
                 })
             };
             Equalizer((0..n).map(of).collect())

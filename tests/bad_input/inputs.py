@@ -40,7 +40,7 @@ spoilt("EMPS time in ms, 300 rows", lambda run: need("panicked" not in run.text 
 spoilt("arm as it is", lambda run: need(run.code == 0 and run.answer["verdict"] == "explained" and not run.answer["data"].get("faults") and not run.answer["data"].get("doubts"), "not right"), ARM, None)
 spoilt("arm, effort of joint5 0", fault("effort_missing", ["joint5"]), ARM, scale(effort__joint5=0))
 spoilt("arm, effort of joint5 3 N m throughout", fault("effort_missing", ["joint5"]), ARM, constant(3.0, "effort.joint5"))
-spoilt("arm, effort in N mm", both(fault("effort_scale", ALL6, 1e3), says("n mm", "grams")), ARM, scale(effort=1e3))
+spoilt("arm, effort in N mm", both(fault("effort_scale", ALL6, 1e3), says("n mm", "a thousandth")), ARM, scale(effort=1e3))
 spoilt("arm, joint5 in degrees", fault("position_scale", ["joint5"], DEGREES), ARM, scale(position__joint5=DEGREES, velocity__joint5=DEGREES))
 spoilt("arm, effort of joint3 x 1000", both(fault("effort_scale", ["joint3"], 1e3), says(never=("10²", "10³", "e+"))), ARM, scale(effort__joint3=1e3))
 spoilt("arm, effort turned round", fault("effort_sign", ALL6), ARM, scale(effort=-1))

@@ -25,9 +25,10 @@ def limits(seconds, size):
 
 
 def run(binary, line, folder, slack, size=None, stdout=None):
-    """Runs a command in a folder, for twice the processor time that it may take."""
+    """Runs a command in a folder, for twice the processor time that it may take. Of a file that grows too large it hears by an
+    error, as on a full disk, and by no signal."""
     with open(os.path.join(folder, "said"), "w+") as said:
-        process = subprocess.Popen([binary, *line.split()], cwd=folder, stdout=stdout or said, stderr=said, stdin=subprocess.DEVNULL, preexec_fn=limits(2 * SECONDS * slack, size))
+        process = subprocess.Popen([binary, *line.split()], cwd=folder, stdout=stdout or said, stderr=said, stdin=subprocess.DEVNULL, preexec_fn=limits(2 * SECONDS * slack, size), restore_signals=False)
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         said.seek(0)

@@ -17,7 +17,8 @@ const TAKEN: f64 = 0.7;
 /// Fewer places tell nothing.
 const FEWEST: usize = 30;
 
-/// Logs that may be the odd one, the likeliest first; none where all are alike. Of two, either may be.
+/// Logs that may be the odd one, the likeliest first; none where all are alike. Of two, each may be beside which the other leaves
+/// more.
 pub(crate) fn odd_ones(model: &Model, sample: &Sample, active: &[bool]) -> Vec<usize> {
     let logs = sample.log.iter().max().map_or(0, |last| last + 1);
     if !(2..=MOST_LOGS).contains(&logs) || sample.len() < FEWEST || !active.contains(&true) {
@@ -31,10 +32,10 @@ pub(crate) fn odd_ones(model: &Model, sample: &Sample, active: &[bool]) -> Vec<u
         (0..logs).into_par_iter().map(|log| (left(model, &sample.without(log), active).0, log)).collect();
     without.sort_by(|a, b| a.0.total_cmp(&b.0));
     let odd = |beside: f64| beside - without[0].0 > ODD;
-    if logs == 2 && without.iter().all(|(left, _)| all - left > ODD) {
-        return without.iter().map(|(_, log)| *log).collect();
+    if logs == 2 {
+        return without.iter().filter(|(left, _)| all - left > ODD).map(|(_, log)| *log).collect();
     }
-    if logs > 2 && odd(all) && odd(without[1].0) { vec![without[0].1] } else { Vec::new() }
+    if odd(all) && odd(without[1].0) { vec![without[0].1] } else { Vec::new() }
 }
 
 /// Whether a log is like the others once it is mended. `logged` and `mended` are all logs before and after.

@@ -191,6 +191,19 @@ impl Data<'_> {
     /// # Errors
     /// An effect that the robot cannot have.
     pub fn refine(&self, candidates: &[Candidate]) -> Result<(Problem, Fit), EffectError> {
+        self.refine_from(candidates, None)
+    }
+
+    /// The same from coefficients that the candidates had before, see [`Fit::coefficients`], where they had any: a drive that turns on its own begins
+    /// with the rotor of its account.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub fn refine_from(
+        &self,
+        candidates: &[Candidate],
+        start: Option<Vec<Option<Vec<f64>>>>,
+    ) -> Result<(Problem, Fit), EffectError> {
         let mut terms: Vec<Term> = candidates.iter().map(|c| Term { candidate: c.clone(), tangent_at: None }).collect();
         let set: Vec<usize> = (0..terms.len()).collect();
         let mut found: Option<Bend> = None;
@@ -203,6 +216,20 @@ impl Data<'_> {
         let mut reached: Option<Reached> = None;
         let mut loaded: Option<Vec<Signals>> = None;
         let mut round = 0;
+        if let Some(mut coefficients) = start {
+            for (own, candidate) in coefficients[1..].iter_mut().zip(candidates).filter(|(_, c)| c.turns()) {
+                *own = Some(vec![candidate.rotor]);
+            }
+            let problem = self.about(terms.clone(), None);
+            let mut at = Fit::on_all(&problem, &set);
+            let own = at.coefficients(&problem);
+            let all: Vec<Vec<f64>> =
+                coefficients.into_iter().zip(own).map(|(start, own)| start.unwrap_or(own)).collect();
+            at.move_to(&problem, &all, 1.0);
+            let (bend, misfit) = self.look(&problem, &at)?;
+            reached = Some(Reached { misfit, coefficients: at.coefficients(&problem) });
+            found = Some(bend);
+        }
         loop {
             let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
             let problem = data.about(terms.clone(), found.as_ref());

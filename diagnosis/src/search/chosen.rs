@@ -4,9 +4,10 @@ use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
 use crate::fit::terms::Entry;
 use crate::numbers::decide::PRICE_OF_TURNING;
+use crate::record::data::Data;
 use crate::search::climb;
 use crate::search::climb::{Choice, Competition};
-use gapscope_effects::{Candidate, Kind};
+use gapscope_effects::{Candidate, EffectError, Kind};
 
 /// What an account leaves: `[episode][joint][signal]`, N m or N.
 pub(crate) type Rest = Vec<Vec<Vec<f64>>>;
@@ -42,6 +43,9 @@ pub(crate) struct Turned {
     pub drive: Candidate,
     /// By how many nats the best account with a rigid drive is less likely.
     pub odds: f64,
+    /// What stood beside it when it was found, each with its coefficients, and the alignment first: a refinement that begins with
+    /// the friction of a rigid drive hardly comes there.
+    pub beside: Vec<(Option<Candidate>, Vec<f64>)>,
 }
 
 impl Chosen {
@@ -88,8 +92,45 @@ impl Chosen {
     }
 }
 
+impl Turned {
+    /// The same with what a fit has beside it.
+    pub(crate) fn beside(self, problem: &Problem, fit: &Fit) -> Turned {
+        let candidates = std::iter::once(None).chain(problem.entries.iter().map(|e| Some(e.candidate.clone())));
+        Turned { beside: candidates.zip(fit.coefficients(problem)).collect(), ..self }
+    }
+
+    /// Where a refinement of some candidates begins: nothing for those that were not there.
+    fn start(&self, candidates: &[Candidate]) -> Option<Vec<Option<Vec<f64>>>> {
+        let known = |candidate: Option<&Candidate>| {
+            let same = |other: Option<&Candidate>| match (candidate, other) {
+                (Some(a), Some(b)) => a.kind == b.kind && a.joints == b.joints,
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            self.beside.iter().find(|(other, _)| same(other.as_ref())).map(|(_, own)| own.clone())
+        };
+        let all = std::iter::once(None).chain(candidates.iter().map(Some));
+        (!self.beside.is_empty()).then(|| all.map(known).collect())
+    }
+}
+
+impl Data<'_> {
+    /// A set at its exact law, a drive in the place of its rotor.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub(crate) fn exact(
+        &self,
+        all: &Problem,
+        set: &[usize],
+        turned: Option<&Turned>,
+    ) -> Result<(Problem, Fit), EffectError> {
+        let candidates = with_drive(all, set, turned);
+        self.refine_from(&candidates, turned.and_then(|turned| turned.start(&candidates)))
+    }
+}
+
 /// The candidates of a set, a drive in the place of its rotor.
-pub(crate) fn with_drive(problem: &Problem, set: &[usize], turned: &Option<Turned>) -> Vec<Candidate> {
-    let own = |c: usize| turned.iter().find(|t| t.place == c).map(|t| t.drive.clone());
+fn with_drive(problem: &Problem, set: &[usize], turned: Option<&Turned>) -> Vec<Candidate> {
+    let own = |c: usize| turned.into_iter().find(|t| t.place == c).map(|t| t.drive.clone());
     set.iter().map(|&c| own(c).unwrap_or_else(|| problem.entries[c].candidate.clone())).collect()
 }

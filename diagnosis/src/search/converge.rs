@@ -5,7 +5,7 @@ use crate::fit::problem::Problem;
 use crate::fit::terms::{Entry, Term};
 use crate::record::data::Data;
 use crate::record::logs::{Progress, Record};
-use crate::search::chosen::{Chosen, Turned, with_drive};
+use crate::search::chosen::{Chosen, Turned};
 use crate::search::climb;
 use crate::search::climb::Choice;
 use gapscope_effects::{Candidate, EffectError, Kind};
@@ -29,7 +29,7 @@ impl Record<'_> {
         let (exact, fit) = loop {
             progress("refining effects", 0.3 + 0.08 * round as f64);
             round += 1;
-            let (exact, fit) = data.refine(&with_drive(&all, &choice.set, &turned))?;
+            let (exact, fit) = data.exact(&all, &choice.set, turned.as_ref())?;
             // The choice again, around the parameters found: knobs turned, and what bends taken into account.
             let changes: Vec<(usize, Candidate)> = choice
                 .set

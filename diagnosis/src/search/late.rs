@@ -1,17 +1,17 @@
 //! Whether effort acts after a delay or through a lag.
 //!
 //! Both laws take the measured effort for their input. A lag smooths its noise, and a servo answers to the noise of the position:
-//! what the laws leave therefore differs by noise as much as by the laws. So they are not compared by the size of what
-//! they leave but by how much of it goes with their difference on a torque without that noise, the one that the motion takes
+//! what the laws leave therefore differs by noise as much as by the laws. So they are compared less by the size of what
+//! they leave than by how much of it goes with their difference on a torque without that noise, the one that the motion takes
 //! by the model, smoothed (instrumental variables; Söderström and Stoica, Instrumental Variable Methods for System
 //! Identification, 1983).
 
-use crate::numbers::decide::{LATE_KNOWN_TO, NOISE_IN_INSTRUMENT};
+use crate::numbers::decide::{LATE_KNOWN_TO, NOISE_IN_INSTRUMENT, TWENTY_TO_ONE};
 use crate::record::data::Data;
 use crate::record::logs::{PART_OF_NOISE, Record};
 use crate::record::rows::{Rows, at_rows};
 use crate::record::signals::Signals;
-use crate::search::chosen::{Chosen, with_drive};
+use crate::search::chosen::Chosen;
 use crate::search::climb::Choice;
 use gapscope_effects::{Candidate, EffectError};
 
@@ -34,9 +34,11 @@ impl Record<'_> {
         let (lost, mut set) = (chosen.choice.set[at], chosen.choice.set.clone());
         set[at] = other;
         set.sort_unstable();
-        let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
+        let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
         let rival = chosen.with(Choice { set }, exact, fit);
-        let odds = self.odds_of_the_second([&chosen, &rival])?;
+        // What they leave counts as a hint: noise is in it.
+        let hint = rival.odds_against(&chosen, self)?.clamp(-TWENTY_TO_ONE, TWENTY_TO_ONE);
+        let odds = self.odds_of_the_second([&chosen, &rival])? + hint;
         let (mut likelier, lost) = if odds <= 0.0 { (chosen, other) } else { (rival, lost) };
         // What was decided here no climb turns round.
         likelier.all.closed.push(likelier.all.entries[lost].candidate.kind);

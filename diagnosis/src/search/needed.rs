@@ -3,7 +3,7 @@
 use crate::fit::estimate::speeds;
 use crate::numbers::decide::DOUBTFUL;
 use crate::record::logs::{Progress, Record};
-use crate::search::chosen::{Chosen, with_drive};
+use crate::search::chosen::Chosen;
 use crate::search::climb;
 use crate::search::climb::Choice;
 use crate::search::rivals;
@@ -45,7 +45,7 @@ impl Record<'_> {
             if set.len() == chosen.choice.set.len() || clear {
                 continue;
             }
-            let (exact, fit) = self.data(&chosen.noise).refine(&with_drive(&chosen.all, &set, &chosen.turned))?;
+            let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
             let without = chosen.with(Choice { set }, exact, fit);
             let mut odds = chosen.odds_against(&without, self)?;
             if odds <= 0.0 || !(kind.is_outside() || chosen.concerns_beside(&without)) {
@@ -67,7 +67,7 @@ impl Record<'_> {
                     set.extend(&next.choice.set);
                     set.sort_unstable();
                     set.dedup();
-                    let (exact, fit) = self.data(&next.noise).refine(&with_drive(&next.all, &set, &next.turned))?;
+                    let (exact, fit) = self.data(&next.noise).exact(&next.all, &set, next.turned.as_ref())?;
                     let both = next.with(Choice { set }, exact, fit);
                     let beside = both.odds_against(&next, self)?;
                     let closed = std::mem::take(&mut chosen.all.closed);
@@ -112,8 +112,7 @@ impl Record<'_> {
                 chosen.choice.set.iter().enumerate().filter(|(i, _)| !gone.contains(i)).map(|(_, &c)| c).collect();
             let choice = Choice { set };
             if gone.len() < own.len() {
-                let candidates = with_drive(&chosen.all, &choice.set, &chosen.turned);
-                let (exact, fit) = self.data(&chosen.noise).refine(&candidates)?;
+                let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &choice.set, chosen.turned.as_ref())?;
                 chosen = chosen.with(choice, exact, fit);
                 continue;
             }

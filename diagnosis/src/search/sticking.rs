@@ -3,7 +3,7 @@
 use crate::fit::estimate::speeds;
 use crate::numbers::decide::OUTLIER;
 use crate::record::logs::Record;
-use crate::search::chosen::{Chosen, with_drive};
+use crate::search::chosen::Chosen;
 use crate::search::climb::Choice;
 use gapscope_effects::EffectError;
 
@@ -39,7 +39,7 @@ impl Record<'_> {
             set.sort_unstable();
             set
         };
-        let refine = |set: &[usize]| self.data(&chosen.noise).refine(&with_drive(&chosen.all, set, &chosen.turned));
+        let refine = |set: &[usize]| self.data(&chosen.noise).exact(&chosen.all, set, chosen.turned.as_ref());
         let mut set = with(&pairs);
         if set == chosen.choice.set {
             return Ok(chosen);

@@ -6,13 +6,16 @@ use crate::fit::terms::Term;
 use crate::numbers::decide::WORTH_A_LOOK;
 use crate::record::floor::noise_floor;
 use crate::record::logs::{Progress, Record};
-use crate::search::chosen::{Chosen, Turned, with_drive};
+use crate::search::chosen::{Chosen, Turned};
 use crate::search::climb;
 use crate::search::converge::weighing;
 use gapscope_effects::{Candidate, EffectError};
 
 /// Accounts of drives that are tried in each pass.
 const ACCOUNTS: usize = 2;
+/// Turns that a drive and what stands beside it take, at most, and the fall of the misfit that is worth another.
+const TURNS: usize = 6;
+const TURN_LEAVES: f64 = 10.0;
 
 impl Record<'_> {
     /// Puts a spring or play in the drive of one joint where the logs speak for it: beside all else that was found, beside the
@@ -56,17 +59,17 @@ impl Record<'_> {
                 choice.set.push(place);
                 choice.set.sort_unstable();
                 choice.set.dedup();
-                let turned = Turned { place, drive: account.drive.clone(), odds: 0.0 };
+                let turned = Turned { place, drive: account.drive, odds: 0.0, beside: Vec::new() };
                 // Beside what was found as it is, and with the choice made again around it.
-                let plain = self.data(&rigid.noise).refine(&with_drive(&all, &choice.set, &Some(turned.clone())))?;
+                let (turned, plain) = self.turned(&rigid.noise, &all, &choice.set, turned, through)?;
                 let next = self.converge(all, choice.clone(), rigid.noise.clone(), Some(turned.clone()), progress)?;
-                let plain = Chosen { turned: Some(turned), ..next.with(choice, plain.0, plain.1) };
+                let plain = Chosen { turned: Some(turned.clone()), ..next.with(choice, plain.0, plain.1) };
                 let next = if plain.odds_against(&next, self)? > 0.0 { plain } else { next };
                 if !next.has_rotor() {
                     continue;
                 }
                 let odds = next.odds_against(best.as_ref().unwrap_or(&rigid), self)?;
-                tried.push((account.drive, odds));
+                tried.push((turned.drive, odds));
                 if odds > 0.0 {
                     best = Some(next);
                 }
@@ -82,6 +85,34 @@ impl Record<'_> {
         }
         let turned = best.turned.map(|turned| Turned { odds, ..turned });
         Ok(Chosen { turned, tried, ..best })
+    }
+
+    /// A drive turned to where it leaves least beside the other candidates of a set, and the set at its exact law: what friction is
+    /// beside a rigid drive hides how far a spring winds up, so that drive and friction are found by turns.
+    fn turned(
+        &self,
+        noise: &[f64],
+        all: &Problem,
+        set: &[usize],
+        mut turned: Turned,
+        through: bool,
+    ) -> Result<(Turned, (Problem, Fit)), EffectError> {
+        let mut best = self.data(noise).exact(all, set, Some(&turned))?;
+        for _ in 0..TURNS {
+            let (exact, fit) = &best;
+            turned = turned.beside(exact, fit);
+            let beside = (0..exact.entries.len()).filter(|&i| !exact.entries[i].candidate.turns()).collect();
+            let others = Fit { set: beside, ..fit.clone() };
+            let again = self.accounts(&turned.drive.joints, exact, &others, through)?;
+            let Some(account) = again.into_iter().next() else { break };
+            let next = Turned { drive: account.drive, ..turned.clone() };
+            let (next_exact, next_fit) = self.data(noise).exact(all, set, Some(&next))?;
+            if next_exact.misfit(&next_fit, &self.band) > exact.misfit(fit, &self.band) - TURN_LEAVES {
+                break;
+            }
+            (turned, best) = (next, (next_exact, next_fit));
+        }
+        Ok((turned, best))
     }
 
     /// The best account of calibration alone: what was found beyond it may stand in for a drive.

@@ -1,0 +1,129 @@
+//! What a fit does not miss is dropped; what could stand in the place of what stays is told.
+
+use crate::choice::{Choice, Comparison, FULL, TAKEN, TRIAL, is_given};
+use crate::fit::{Fit, normal};
+use crate::interval::Spread;
+use crate::kinds::Kind;
+use crate::weigh::independent;
+
+/// Drops what the fit does not miss; what stays, with the nats it is worth.
+pub fn drop_needless(
+    choice: &Choice,
+    kinds: &mut Vec<Kind>,
+    best: &mut Fit,
+    why: &mut Vec<Comparison>,
+) -> Vec<(Kind, f64)> {
+    loop {
+        let samples = independent(choice.joint, &best.errors);
+        let mut worth = Vec::new();
+        let mut sure = Vec::new();
+        let missing = Missing::new(best);
+        for &kind in kinds.iter() {
+            if let Some(nats) = choice.surely(best, kinds, kind, samples, &missing) {
+                sure.push((kind, nats));
+                continue;
+            }
+            // What stands on a kind goes with it.
+            let without: Vec<Kind> =
+                kinds.iter().copied().filter(|other| *other != kind && other.base() != Some(kind)).collect();
+            let mut law = best.law;
+            kind.clear(&mut law, &choice.joint.start, &without);
+            let poor = choice.fit(&law, &without, None, TRIAL);
+            let nats = choice.nats(best, &poor, kind, samples);
+            // The bodies of the URDF weigh something for certain: where their weight alone accounts for a constant torque,
+            // and fixes the drive's scale, no bias takes its place.
+            let weightless =
+                kind == Kind::Bias && !Spread::of(best).scale_is_known() && Spread::of(&poor).scale_is_known();
+            let relevant = choice.relevant(best, &poor) && !weightless;
+            worth.push((kind, nats, relevant, poor, without));
+        }
+        let needless = worth
+            .iter()
+            .enumerate()
+            .filter(|(_, (_, nats, relevant, _, _))| *nats <= TAKEN || !relevant)
+            .min_by(|a, b| a.1.1.total_cmp(&b.1.1))
+            .map(|(at, _)| at);
+        let Some(at) = needless else {
+            why.extend(worth.iter().map(|w| Comparison { proposed: w.0, nats: w.1, taken: true, last: true }));
+            why.extend(sure.iter().map(|s| Comparison { proposed: s.0, nats: s.1, taken: true, last: true }));
+            return worth.into_iter().map(|w| (w.0, w.1)).chain(sure).collect();
+        };
+        let (kind, nats, _, poor, without) = worth.swap_remove(at);
+        why.push(Comparison { proposed: kind, nats, taken: false, last: true });
+        *kinds = without;
+        *best = choice.fit(&poor.law, kinds, None, FULL);
+    }
+}
+
+/// From so many nats on, by the linearised loss of a kind, it is kept without a fit that lacks it.
+const SURE: f64 = 40.0;
+
+/// What a fit loses without some of its parameters, to second order.
+struct Missing {
+    inverse: Option<nalgebra::DMatrix<f64>>,
+}
+
+impl Missing {
+    fn new(fit: &Fit) -> Missing {
+        let (mut information, _) = normal(&fit.sensitivity, &fit.errors);
+        for i in 0..fit.free.len() {
+            information[(i, i)] = information[(i, i)] * (1.0 + 1e-9) + 1e-30;
+        }
+        Missing { inverse: information.try_inverse() }
+    }
+
+    /// dᵀ C⁻¹ d with the covariance C of the parameters at `at` and their distance d from where they would be.
+    fn loss(&self, at: &[usize], distance: &[f64]) -> Option<f64> {
+        let inverse = self.inverse.as_ref()?;
+        let block = nalgebra::DMatrix::from_fn(at.len(), at.len(), |i, j| inverse[(at[i], at[j])]);
+        let d = nalgebra::DVector::from_column_slice(distance);
+        let loss = d.dot(&block.lu().solve(&d)?);
+        (loss.is_finite() && loss > 0.0).then_some(loss)
+    }
+}
+
+impl Choice<'_> {
+    /// Nats that a kind is worth where there can be no doubt of it; `None` where a fit without it must say.
+    fn surely(&self, best: &Fit, kinds: &[Kind], kind: Kind, samples: f64, missing: &Missing) -> Option<f64> {
+        if kind.is_threshold() || kind == Kind::Bias || kinds.iter().any(|other| other.base() == Some(kind)) {
+            return None;
+        }
+        let (mut at, mut distance) = (Vec::new(), Vec::new());
+        for (param, _, _) in kind.parameters() {
+            at.push(best.free.iter().position(|free| free == param)?);
+            distance.push(best.law[*param] - self.joint.start[*param]);
+        }
+        let loss = missing.loss(&at, &distance)?;
+        let more = kind.parameters().len() as f64;
+        let nats =
+            0.5 * samples * ((best.cost + loss) / best.cost.max(1e-300)).ln() - 0.5 * more * samples.ln() - kind.cost();
+        (nats > SURE && loss > 4.0 * self.least(best.cost)).then_some(nats)
+    }
+}
+
+/// A rival ties with a kind if the error with it in the kind's place is at most this much more.
+const TIE: f64 = 0.02;
+
+/// Pairs of a kind that was taken and one that could stand in its place.
+pub fn ties(choice: &Choice, kinds: &[Kind], best: &Fit, possible: &[Kind]) -> Vec<(Kind, Kind)> {
+    let mut ties = Vec::new();
+    for &kind in kinds {
+        for &rival in kind.rivals().iter().filter(|rival| possible.contains(rival) && !kinds.contains(rival)) {
+            // What exists only against a given value is no rival where nothing is given.
+            if rival.needs_given() && !is_given(choice.joint, rival) {
+                continue;
+            }
+            if rival.base().is_some_and(|base| !kinds.contains(&base)) {
+                continue;
+            }
+            let mut law = best.law;
+            let instead: Vec<Kind> = kinds.iter().copied().filter(|k| *k != kind).chain([rival]).collect();
+            kind.clear(&mut law, &choice.joint.start, &instead);
+            let other = choice.fit(&law, &instead, Some(rival), TRIAL);
+            if other.cost.sqrt() <= (1.0 + TIE) * best.cost.sqrt() {
+                ties.push((kind, rival));
+            }
+        }
+    }
+    ties
+}

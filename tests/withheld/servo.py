@@ -377,13 +377,13 @@ def attempt(rng, kinds):
             seal(kind, some, {"width": float(real["dead_band"][joint])})
             undo_drive["dead_band"] = np.zeros(n)
         elif kind in ("speed_limit", "torque_saturation"):
-            joint, part, seen = int(rng.integers(n)), rng.uniform(0.3, 0.6), []
+            joint, part, seen = int(rng.integers(n)), rng.uniform(0.2, 0.6), []
             for motion, times in runs[:4]:
                 q, push = simulate(links, real, hidden, clock, motion, times, torques=True)
                 seen.append(np.abs(push[:, joint]) if kind != "speed_limit" else np.abs(np.diff(q[:, joint]) / np.diff(times)))
             seen = np.concatenate(seen)
             at = part * seen.max() if kind == "speed_limit" else max(part * seen.max(), 1.4 * (weight + friction)[joint])
-            if not 0.02 <= np.mean(seen > at) <= 0.4:
+            if not 0.004 <= np.mean(seen > at) <= 0.4:
                 raise Redraw
             key = "speed_limit" if kind == "speed_limit" else "torque_limit"
             real[key] = real[key].copy()

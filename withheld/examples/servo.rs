@@ -40,7 +40,7 @@ fn main() {
 }
 
 /// The cases of a bank by their numbers.
-fn made(seed: u64, count: usize, only: Option<&[usize]>) -> Vec<(usize, Case)> {
+fn made(seed: u64, count: usize, only: Option<&[usize]>) -> impl Iterator<Item = (usize, Case)> {
     let mut plan: Plan = serde_json::from_value(serde_json::json!({
         "cases": 0, "multi": 0, "mixed": 0, "none": 0, "unknown": 0, "robots": ["arm7"], "seed": seed,
         "difficulty": Difficulty::Mixed, "seconds": 10.0, "episodes": 4, "tests": 2, "servo": true
@@ -50,16 +50,15 @@ fn made(seed: u64, count: usize, only: Option<&[usize]>) -> Vec<(usize, Case)> {
     let urdf = gapscope_dynamics::robots::arm7();
     let robot = Robot::new("arm7".into(), urdf.into(), Model::from_urdf(urdf).unwrap().model).unwrap();
     let specs = plan.specs().into_iter().enumerate();
-    specs
-        .filter(|(i, _)| only.is_none_or(|only| only.contains(i)))
-        .filter_map(|(i, spec)| match make_case(&robot, &spec) {
+    specs.filter(move |(i, _)| only.is_none_or(|only| only.contains(i))).filter_map(move |(i, spec)| {
+        match make_case(&robot, &spec) {
             Ok(case) => Some((i, case)),
             Err(error) => {
                 println!("{i:03} {error}");
                 None
             }
-        })
-        .collect()
+        }
+    })
 }
 
 fn read(bank: &Path, name: &str) -> Case {

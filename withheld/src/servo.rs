@@ -38,7 +38,7 @@ const INDEPENDENT: f64 = 800.0;
 /// By how much a drive is moved to see what it does: part of stiffness and damping, and a latency in s.
 const PROBE: (f64, f64) = (0.05, 2e-3);
 /// Least and greatest part of the samples that a limit must cut.
-const CUT: [f64; 2] = [0.02, 0.4];
+const CUT: [f64; 2] = [0.004, 0.4];
 /// A joint must hold its own weight with this much to spare.
 const SPARE: f64 = 1.4;
 

@@ -111,7 +111,7 @@ pub(crate) fn servo_effect(
         }
         // Its limits hang on how fast and how hard the arm moves: a first run has to show it.
         Sort::Known(Kind::SpeedLimit | Kind::TorqueSaturation) => {
-            let part = random.random_range(0.3..0.6);
+            let part = random.random_range(0.2..0.6);
             drawn(arm, sort, vec![joint], json!({ "part": part }), vec![])
         }
         Sort::Known(Kind::JointElasticity) => {

@@ -10,13 +10,12 @@ use crate::kinds::Kind;
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
 use crate::simulate::errors;
-use crate::weigh::independent;
+use crate::weigh::{independent, least, tracking, weigh};
 
-/// A kind must lower the squared error by this share of what is left, and its square root by this share of perfect tracking's
-/// error: no servo is modelled to better, and no integrator is another's to better.
-pub const RELEVANT: [f64; 2] = [0.04, 0.005];
 /// Steps of a fit that only decides whether a kind is worth more.
 pub(crate) const TRIAL: usize = 8;
+/// Steps of a fit that only decides whether a kind is tried.
+const GLANCE: usize = 4;
 /// Steps of a fit that is kept.
 pub(crate) const FULL: usize = 25;
 /// Nats from which on a kind is taken: no law of a servo is exact, and what is left of it speaks for some kind or other.
@@ -50,7 +49,8 @@ impl<'a> Projector<'a> {
         for i in 0..sensitivity.len() {
             normal[(i, i)] *= 1.0 + 1e-9;
         }
-        Projector { sensitivity, inverse: normal.try_inverse() }
+        let inverse = if sensitivity.is_empty() { None } else { normal.try_inverse() };
+        Projector { sensitivity, inverse }
     }
 
     pub(crate) fn clear(&self, mut change: Vec<f64>) -> Vec<f64> {
@@ -71,6 +71,8 @@ pub(crate) struct Choice<'a> {
     pub(crate) base: Vec<Param>,
     /// Squared error of perfect tracking in the units of the costs.
     pub(crate) perfect: f64,
+    /// The law that the first fit begins with: next to no friction.
+    pub(crate) bare: Law,
 }
 
 impl Choice<'_> {
@@ -91,8 +93,7 @@ impl Choice<'_> {
     /// The best fit of some kinds from a law, with those of `new` started afresh.
     pub(crate) fn fit(&self, law: &Law, kinds: &[Kind], new: Option<Kind>, steps: usize) -> Fit {
         let free = self.free(kinds);
-        let from = |(start, link_side): (f64, bool)| {
-            let mut law = *law;
+        let from = |(mut law, start, link_side): (Law, f64, bool)| {
             if let Some(kind) = new {
                 self.begin(kind, &mut law, start);
                 law.link_side |= link_side;
@@ -100,16 +101,27 @@ impl Choice<'_> {
             fit(&law, &free, &self.joint.runs, &self.joint.ranges, steps)
         };
         let starts: &[f64] = new.map_or(&[1.0], Kind::starts);
-        // The log does not say on which side of the play its encoder is: both are tried.
-        let sides: &[bool] = if new == Some(Kind::Backlash) { &[false, true] } else { &[false] };
-        let starts = starts.iter().flat_map(|&start| sides.iter().map(move |&side| (start, side)));
-        let mut fits: Vec<Fit> = starts.map(from).collect();
+        let mut places: Vec<(Law, f64, bool)> = Vec::new();
+        for &start in starts {
+            places.extend(new.map_or(&[false][..], Kind::sides).iter().map(|&side| (*law, start, side)));
+            // What friction stood in for is not felt beside that friction.
+            places.extend(new.filter(|kind| kind.hides()).map(|_| (self.bare, start, false)));
+        }
+        let mut fits: Vec<Fit> = places.into_iter().map(from).collect();
         fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         fits.swap_remove(0)
     }
 
     /// The kinds that promise most beside a fit, by one linearised step: at most [`TRIED`].
-    pub(crate) fn screen(&self, best: &Fit, kinds: &[Kind], possible: &[Kind], why: &mut Vec<Comparison>) -> Vec<Kind> {
+    /// In the `first` round, kinds that friction stood in for are looked at without that friction too.
+    pub(crate) fn screen(
+        &self,
+        best: &Fit,
+        kinds: &[Kind],
+        possible: &[Kind],
+        first: bool,
+        why: &mut Vec<Comparison>,
+    ) -> Vec<Kind> {
         let samples = independent(self.joint, &best.errors);
         let project = Projector::new(&best.sensitivity);
         let mut promises = Vec::new();
@@ -120,7 +132,9 @@ impl Choice<'_> {
             if kind.base().is_some_and(|base| !kinds.contains(&base)) {
                 continue;
             }
-            let gain = kind.starts().iter().map(|&start| self.promise(best, &project, kind, start)).fold(0.0, f64::max);
+            let places = kind.starts().iter().flat_map(|&start| kind.sides().iter().map(move |&side| (start, side)));
+            let slope = places.map(|(start, side)| self.promise(best, &project, kind, start, side)).fold(0.0, f64::max);
+            let gain = if first && kind.hides() { slope.max(self.glance(best, kinds, kind)) } else { slope };
             let rest = (best.cost - gain).max(1e-3 * best.cost);
             let nats = 0.5 * samples * (best.cost / rest).ln() - 0.5 * samples.ln() - kind.cost();
             if nats > 0.0 && gain > self.least(rest) {
@@ -134,7 +148,7 @@ impl Choice<'_> {
     }
 
     /// Squared error that a kind would take away if errors were linear in it from a small start on.
-    fn promise(&self, best: &Fit, project: &Projector, kind: Kind, start: f64) -> f64 {
+    fn promise(&self, best: &Fit, project: &Projector, kind: Kind, start: f64, link_side: bool) -> f64 {
         let Some(&(param, _, _)) = kind.parameters().first() else { return 0.0 };
         let mut law = best.law;
         if kind.base().is_some() {
@@ -143,6 +157,7 @@ impl Choice<'_> {
         let size = self.joint.ranges.scale[param as usize];
         if kind.is_threshold() {
             self.begin(kind, &mut law, start);
+            law.link_side |= link_side;
         } else {
             law[param] += 0.1 * start * size;
         }
@@ -156,6 +171,12 @@ impl Choice<'_> {
         if energy <= 0.0 || (!signed && along >= 0.0) { 0.0 } else { along * along / energy }
     }
 
+    /// Squared error that a kind takes away in a few steps from next to no friction.
+    fn glance(&self, best: &Fit, kinds: &[Kind], kind: Kind) -> f64 {
+        let with: Vec<Kind> = kinds.iter().copied().chain([kind]).collect();
+        (best.cost - self.fit(&self.bare, &with, Some(kind), GLANCE).cost).max(0.0)
+    }
+
     /// Nats by which a richer fit is ahead of a poorer one.
     pub(crate) fn nats(&self, rich: &Fit, poor: &Fit, kind: Kind, samples: f64) -> f64 {
         let more = kind.parameters().len() as f64;
@@ -164,29 +185,17 @@ impl Choice<'_> {
 
     /// The least fall of the squared error that counts, where `rest` is left.
     pub(crate) fn least(&self, rest: f64) -> f64 {
-        (RELEVANT[0] * rest).max(RELEVANT[1] * RELEVANT[1] * self.perfect)
+        least(rest, self.perfect)
     }
 
     pub(crate) fn relevant(&self, rich: &Fit, poor: &Fit) -> bool {
         poor.cost - rich.cost > self.least(rich.cost)
     }
 
-    pub(crate) fn measure_perfect(&mut self) {
-        let mut sum = 0.0;
-        for run in &self.joint.runs {
-            let Some(target) = &run.target else {
-                // Without a set point the motion itself is what a model has to explain.
-                let mean = run.position.iter().sum::<f64>() / run.position.len() as f64;
-                sum += run.position.iter().zip(&run.weight).map(|(q, w)| (w * (q - mean)).powi(2)).sum::<f64>();
-                continue;
-            };
-            for k in 0..run.time.len() {
-                if run.on[k] {
-                    sum += (run.weight[k] * (target.at(k) - run.position[k])).powi(2);
-                }
-            }
-        }
-        self.perfect = sum;
+    /// Weights the runs by the errors of a law.
+    pub(crate) fn weigh(&mut self, law: &Law) {
+        weigh(self.joint, law);
+        self.perfect = tracking(self.joint);
     }
 }
 

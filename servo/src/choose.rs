@@ -4,10 +4,10 @@ use crate::choice::{Choice, Comparison, FULL, TAKEN, TRIAL, is_given};
 use crate::fit::{Fit, fit};
 use crate::kinds::Kind;
 use crate::law::Param;
-use crate::needless::{drop_needless, ties};
+use crate::needless::{drop_needless, exchange, ties};
 use crate::prepare::Joint;
 use crate::run::Signal;
-use crate::weigh::{independent, weigh};
+use crate::weigh::independent;
 
 /// Kinds that one joint may have at most, before what is needless is dropped.
 const MOST: usize = 9;
@@ -49,24 +49,25 @@ pub fn choose(joint: &mut Joint) -> Chosen {
         }
     }
     let possible: Vec<Kind> = Kind::ALL.into_iter().filter(|&kind| is_possible(joint, kind, closed)).collect();
-    let mut choice = Choice { joint, base, perfect: 0.0 };
+    let mut choice = Choice { joint, base, perfect: 0.0, bare: law };
     // What most servos have stands in from the beginning: beside each other these show, and each hides behind the rest's lack.
     let mut kinds: Vec<Kind> = USUAL.into_iter().filter(|kind| possible.contains(kind)).collect();
     for (param, _, _) in kinds.iter().flat_map(|kind| kind.parameters()) {
         law[*param] = 0.1 * choice.joint.ranges.scale[*param as usize];
     }
     law[Param::Bias] = 0.0;
+    choice.bare = law;
     let mut why = Vec::new();
     let mut best = choice.fit(&law, &kinds, None, FULL);
+    let usual = kinds.len();
     loop {
-        weigh(choice.joint, &best.law);
-        choice.measure_perfect();
+        choice.weigh(&best.law);
         best = choice.fit(&best.law, &kinds, None, FULL);
         if kinds.len() >= MOST {
             break;
         }
         let mut top: Option<(f64, Kind, Fit)> = None;
-        let screened = choice.screen(&best, &kinds, &possible, &mut why);
+        let screened = choice.screen(&best, &kinds, &possible, kinds.len() == usual, &mut why);
         for kind in screened {
             let with: Vec<Kind> = kinds.iter().copied().chain([kind]).collect();
             let rich = choice.fit(&best.law, &with, Some(kind), TRIAL);
@@ -85,10 +86,12 @@ pub fn choose(joint: &mut Joint) -> Chosen {
         }
         best = choice.fit(&rich.law, &kinds, None, FULL);
     }
-    weigh(choice.joint, &best.law);
-    choice.measure_perfect();
+    choice.weigh(&best.law);
     best = choice.fit(&best.law, &kinds, None, FULL);
-    let kept = drop_needless(&choice, &mut kinds, &mut best, &mut why);
+    let mut kept = drop_needless(&choice, &mut kinds, &mut best, &mut why);
+    if exchange(&choice, &mut kinds, &mut best, &possible, &mut why) {
+        kept = drop_needless(&choice, &mut kinds, &mut best, &mut why);
+    }
     let ties = ties(&choice, &kinds, &best, &possible);
     let samples = independent(choice.joint, &best.errors);
     let mut found = kept;

@@ -4,6 +4,7 @@
 use crate::arm::simulate_arm;
 use crate::choose::{Chosen, choose};
 use crate::claims::{confidence, drive, effects, reasons, whole_effect};
+use crate::clock::nominal_rate;
 use crate::evidence::Evidence;
 use crate::fit::fit;
 use crate::gap::{self, Errors};
@@ -66,6 +67,7 @@ pub fn diagnose(
             .filter(|joint| !joint.moved)
             .map(|joint| format!("{}: does not move and is not told to; nothing is said of it", joint.name)),
     );
+    findings.extend(nominal_rate(episodes));
     progress("how far the arm's free run is from the logs", 0.8);
     let weights = weights(&all, episodes);
     let law = |j: usize| chosen[j].as_ref().map_or(all[j].start_still(), |c| c.fit.law);

@@ -189,6 +189,16 @@ impl Kind {
         matches!(self, Kind::Saturation | Kind::SpeedLimit | Kind::DeadBand | Kind::Elasticity | Kind::Backlash)
     }
 
+    /// Whether friction stands in for it in a fit that has friction before: both slow a joint down.
+    pub fn hides(self) -> bool {
+        matches!(self, Kind::Saturation | Kind::SpeedLimit)
+    }
+
+    /// Whether the encoder may be on the link's side of it. The log does not say on which: both are tried.
+    pub fn sides(self) -> &'static [bool] {
+        if self == Kind::Backlash { &[false, true] } else { &[false] }
+    }
+
     /// Kinds that logs may take for this one.
     pub fn rivals(self) -> &'static [Kind] {
         match self {

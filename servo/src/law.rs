@@ -174,6 +174,12 @@ impl Law {
         slow.max(((self[Param::Scale] * inertia + self[Param::Armature]) / stiffness).sqrt())
     }
 
+    /// Time within which damping alone stops a joint that its drive lets go, s; `inertia` is M.
+    pub fn coasting(&self, inertia: f64) -> f64 {
+        let drag = (self[Param::Damping] + self[Param::Viscous]).max(1e-12);
+        (self[Param::Scale] * inertia + self[Param::Armature]) / drag
+    }
+
     /// Position at the end of a step, rad.
     pub fn move_on(h: f64, q: f64, v: f64, v_end: f64) -> f64 {
         q + h * ((1.0 - END) * v + END * v_end)

@@ -9,6 +9,7 @@ mod around;
 mod choice;
 mod choose;
 mod claims;
+mod clock;
 mod diagnose;
 mod evaluate;
 mod evidence;

@@ -43,6 +43,14 @@ pub fn drop_needless(
             .filter(|(_, (_, nats, relevant, _, _))| *nats <= TAKEN || !relevant)
             .min_by(|a, b| a.1.1.total_cmp(&b.1.1))
             .map(|(at, _)| at);
+        if needless.is_none()
+            && let Some((pair, nats, without, poor)) = needless_pair(choice, kinds, best, samples)
+        {
+            why.extend(pair.map(|proposed| Comparison { proposed, nats, taken: false, last: true }));
+            *kinds = without;
+            *best = choice.fit(&poor.law, kinds, None, FULL);
+            continue;
+        }
         let Some(at) = needless else {
             why.extend(worth.iter().map(|w| Comparison { proposed: w.0, nats: w.1, taken: true, last: true }));
             why.extend(sure.iter().map(|s| Comparison { proposed: s.0, nats: s.1, taken: true, last: true }));
@@ -53,6 +61,31 @@ pub fn drop_needless(
         *kinds = without;
         *best = choice.fit(&poor.law, kinds, None, FULL);
     }
+}
+
+/// Two kinds of calibration that the fit does not miss together, though it misses each beside the other: what one does to the
+/// motion the other undoes.
+fn needless_pair(
+    choice: &Choice,
+    kinds: &[Kind],
+    best: &Fit,
+    samples: f64,
+) -> Option<([Kind; 2], f64, Vec<Kind>, Fit)> {
+    let is_based_on = |kind: Kind| kinds.iter().any(|other| other.base() == Some(kind));
+    let usual: Vec<Kind> = kinds.iter().copied().filter(|kind| kind.cost() == 0.0 && !is_based_on(*kind)).collect();
+    for (i, &a) in usual.iter().enumerate() {
+        for &b in &usual[i + 1..] {
+            let without: Vec<Kind> = kinds.iter().copied().filter(|other| ![a, b].contains(other)).collect();
+            let mut law = best.law;
+            [a, b].into_iter().for_each(|kind| kind.clear(&mut law, &choice.joint.start, &without));
+            let poor = choice.fit(&law, &without, None, TRIAL);
+            let nats = choice.nats(best, &poor, a, samples) - 0.5 * b.parameters().len() as f64 * samples.ln();
+            if nats <= TAKEN || !choice.relevant(best, &poor) {
+                return Some(([a, b], nats, without, poor));
+            }
+        }
+    }
+    None
 }
 
 /// From so many nats on, by the linearised loss of a kind, it is kept without a fit that lacks it.
@@ -101,6 +134,61 @@ impl Choice<'_> {
     }
 }
 
+/// Puts rivals in the place of kinds where the logs prefer them; whether any was.
+pub fn exchange(
+    choice: &Choice,
+    kinds: &mut Vec<Kind>,
+    best: &mut Fit,
+    possible: &[Kind],
+    why: &mut Vec<Comparison>,
+) -> bool {
+    let mut any = false;
+    for kind in kinds.clone() {
+        let rivals: Vec<_> = instead_of(choice, kinds, best, possible, kind).collect();
+        for (rival, instead, other) in rivals {
+            let samples = independent(choice.joint, &other.errors);
+            let more = rival.parameters().len() as f64 - kind.parameters().len() as f64;
+            let nats = 0.5 * samples * (best.cost / other.cost.max(1e-300)).ln() - 0.5 * more * samples.ln()
+                + kind.cost()
+                - rival.cost();
+            let taken = nats > TAKEN;
+            why.push(Comparison { proposed: rival, nats, taken, last: false });
+            if taken {
+                *best = choice.fit(&other.law, &instead, None, FULL);
+                *kinds = instead;
+                any = true;
+                break;
+            }
+        }
+    }
+    any
+}
+
+/// Fits with each rival of a kind in its place.
+fn instead_of<'a>(
+    choice: &'a Choice,
+    kinds: &'a [Kind],
+    best: &'a Fit,
+    possible: &'a [Kind],
+    kind: Kind,
+) -> impl Iterator<Item = (Kind, Vec<Kind>, Fit)> + 'a {
+    let stands = kinds.contains(&kind);
+    let rivals = kind.rivals().iter().copied().filter(move |rival| stands && possible.contains(rival));
+    // What exists only against a given value is no rival where nothing is given.
+    let rivals =
+        rivals.filter(|rival| !kinds.contains(rival) && (!rival.needs_given() || is_given(choice.joint, *rival)));
+    rivals.filter(move |rival| rival.base().is_none_or(|base| kinds.contains(&base) && base != kind)).map(
+        move |rival| {
+            let mut law = best.law;
+            let stay = |other: &Kind| *other != kind && other.base() != Some(kind);
+            let instead: Vec<Kind> = kinds.iter().copied().filter(stay).chain([rival]).collect();
+            kind.clear(&mut law, &choice.joint.start, &instead);
+            let other = choice.fit(&law, &instead, Some(rival), TRIAL);
+            (rival, instead, other)
+        },
+    )
+}
+
 /// A rival ties with a kind if the error with it in the kind's place is at most this much more.
 const TIE: f64 = 0.02;
 
@@ -108,18 +196,7 @@ const TIE: f64 = 0.02;
 pub fn ties(choice: &Choice, kinds: &[Kind], best: &Fit, possible: &[Kind]) -> Vec<(Kind, Kind)> {
     let mut ties = Vec::new();
     for &kind in kinds {
-        for &rival in kind.rivals().iter().filter(|rival| possible.contains(rival) && !kinds.contains(rival)) {
-            // What exists only against a given value is no rival where nothing is given.
-            if rival.needs_given() && !is_given(choice.joint, rival) {
-                continue;
-            }
-            if rival.base().is_some_and(|base| !kinds.contains(&base)) {
-                continue;
-            }
-            let mut law = best.law;
-            let instead: Vec<Kind> = kinds.iter().copied().filter(|k| *k != kind).chain([rival]).collect();
-            kind.clear(&mut law, &choice.joint.start, &instead);
-            let other = choice.fit(&law, &instead, Some(rival), TRIAL);
+        for (rival, _, other) in instead_of(choice, kinds, best, possible, kind) {
             if other.cost.sqrt() <= (1.0 + TIE) * best.cost.sqrt() {
                 ties.push((kind, rival));
             }

@@ -6,6 +6,32 @@ use crate::law::{Law, Param};
 use crate::prepare::Joint;
 use crate::simulate::{STEP_PART, STEPS, simulate};
 
+/// An effect must lower the squared error by this share of what is left, and its square root by this share of perfect
+/// tracking's error: no servo is modelled to better, and no integrator is another's to better.
+const RELEVANT: [f64; 2] = [0.04, 0.005];
+
+/// The least fall of a joint's squared error that counts, where `rest` is left and perfect tracking leaves `perfect`.
+pub fn least(rest: f64, perfect: f64) -> f64 {
+    (RELEVANT[0] * rest).max(RELEVANT[1] * RELEVANT[1] * perfect)
+}
+
+/// Squared error of perfect tracking, by the weights of a joint's runs.
+pub fn tracking(joint: &Joint) -> f64 {
+    let mut sum = 0.0;
+    for run in &joint.runs {
+        let Some(target) = &run.target else {
+            // Without a set point the motion itself is what a model has to explain.
+            let mean = run.position.iter().sum::<f64>() / run.position.len() as f64;
+            sum += run.position.iter().zip(&run.weight).map(|(q, w)| (w * (q - mean)).powi(2)).sum::<f64>();
+            continue;
+        };
+        for k in (0..run.time.len()).filter(|&k| run.on[k]) {
+            sum += (run.weight[k] * (target.at(k) - run.position[k])).powi(2);
+        }
+    }
+    sum
+}
+
 /// Effective number of independent samples in errors of runs, from their autocorrelation.
 pub fn independent(joint: &Joint, errors: &[f64]) -> f64 {
     let mut from = 0;
@@ -42,8 +68,11 @@ pub fn weigh(joint: &mut Joint, law: &Law) {
     let [least, greatest] = STEPS;
     // A spring is followed as closely as a servo; the hard end of play, as closely as the shortest step lets it.
     let spring = 1.0 / law[Param::Spring];
-    let shortest =
-        law.time_constant(joint.sizes.inertia).min(if law.winds_up() { 2.0 * spring } else { f64::INFINITY });
+    let inertia = joint.sizes.inertia;
+    let shortest = law
+        .time_constant(inertia)
+        .min(if law.winds_up() { 2.0 * spring } else { f64::INFINITY })
+        .min(if law[Param::DeadBand] > 0.0 { law.coasting(inertia) } else { f64::INFINITY });
     let length = (STEP_PART * shortest).clamp(least, greatest);
     for run in &mut joint.runs {
         run.step = length;

@@ -13,7 +13,7 @@ use crate::law::{Law, Param};
 use crate::prepare::Joint;
 use crate::run::Surroundings;
 use crate::simulate::errors;
-use crate::weigh::independent;
+use crate::weigh::{independent, least, tracking};
 use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Effect, GravityMisalignment, Payload, Plant};
@@ -25,8 +25,6 @@ const COST: f64 = 3.0;
 /// Steps on θ, and steps of the joints' own parameters for each of them.
 const STEPS: usize = 4;
 const LOCAL: usize = 4;
-/// Of a joint's squared error, what such an effect must take away at one joint at least.
-const RELEVANT: f64 = 0.04;
 /// A rival ties if the error with it is at most this much more.
 const TIE: f64 = 0.02;
 /// Most that a base is tilted, rad; heaviest body, as a part of the arm's mass; and furthest that it lies from the last joint
@@ -99,15 +97,28 @@ impl Whole {
         })
     }
 
-    fn clamped(self, model: &Model, values: &DVector<f64>) -> Vec<f64> {
+    /// Least and greatest value of each number, where the body weighs `mass`, kg.
+    fn bounds(self, model: &Model, mass: f64) -> Vec<[f64; 2]> {
         let most = BOUNDS.1 * weight(model);
-        let mass = values[0].clamp(1e-3 * most, most);
-        let one = |(i, value): (usize, &f64)| match (self, i) {
-            (Whole::Tilt, _) => value.clamp(-BOUNDS.0, BOUNDS.0),
-            (Whole::Payload, 0) => mass,
-            (Whole::Payload, _) => value.clamp(-BOUNDS.2 * mass, BOUNDS.2 * mass),
-        };
-        values.iter().enumerate().map(one).collect()
+        match self {
+            Whole::Tilt => vec![[-BOUNDS.0, BOUNDS.0]; 2],
+            Whole::Payload => {
+                let moment = BOUNDS.2 * mass;
+                vec![[1e-3 * most, most], [-moment, moment], [-moment, moment], [-moment, moment]]
+            }
+        }
+    }
+
+    fn clamped(self, model: &Model, values: &DVector<f64>) -> Vec<f64> {
+        let [least, most] = self.bounds(model, values[0])[0];
+        let bounds = self.bounds(model, values[0].clamp(least, most));
+        values.iter().zip(bounds).map(|(value, [least, most])| value.clamp(least, most)).collect()
+    }
+
+    /// Whether a number lies at its bound: something else is there.
+    fn at_bound(self, model: &Model, values: &[f64]) -> bool {
+        let bounds = self.bounds(model, values[0]);
+        values.iter().zip(bounds).any(|(value, [least, most])| *value <= least || *value >= most)
     }
 }
 
@@ -161,6 +172,14 @@ struct Settled {
     values: Vec<f64>,
     fits: Vec<Option<Fit>>,
     normal: DMatrix<f64>,
+}
+
+impl Settled {
+    /// Nats by which its numbers lie off nothing, by their normal equations.
+    fn nats(&self) -> f64 {
+        let values = DVector::from_column_slice(&self.values);
+        0.5 * values.dot(&(&self.normal * &values))
+    }
 }
 
 impl Search<'_> {
@@ -336,7 +355,9 @@ pub fn look(
         let Some(probed) = probed else { continue };
         let search = Search { whole, model, episodes, plain: &plain, probed: &probed, probes: &probes };
         put(joints, &plain);
-        let fits: Vec<Option<Fit>> = chosen.iter().map(|c| c.as_ref().map(|c| c.fit.clone())).collect();
+        let perfect: Vec<f64> = joints.iter().map(tracking).collect();
+        // What more steps of the same account take away speaks for no effect.
+        let fits = search.fits(joints, &beside, STEPS * LOCAL);
         let price = |fits: &[Option<Fit>]| {
             let samples: f64 = joints
                 .iter()
@@ -346,11 +367,11 @@ pub fn look(
             0.5 * whole.numbers() as f64 * samples.max(2.0).ln() + COST
         };
         let cost = price(&fits);
-        let mut tried: Vec<(f64, Settled, bool)> = Vec::new();
+        let mut tried: Vec<(f64, Settled, f64)> = Vec::new();
         if search.promise(joints, &fits) > 0.5 * cost
             && let Some(settled) = search.settle(joints, &beside)
         {
-            tried.push((nats(joints, &fits, &settled.fits) - cost, settled, false));
+            tried.push((nats(joints, &fits, &settled.fits) - cost, settled, 0.0));
         }
         if has_constant.iter().any(|has| *has)
             && let Some(settled) = search.settle(joints, &instead)
@@ -364,17 +385,21 @@ pub fn look(
             if other.sqrt() <= (1.0 + TIE) * total.sqrt() {
                 outcome.ties.push(whole);
             }
-            tried.push((nats(joints, &fits, &settled.fits) - cost + saved, settled, true));
+            tried.push((nats(joints, &fits, &settled.fits) - cost + saved, settled, saved));
         }
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let Some((nats, settled, instead)) = tried.into_iter().next() else { continue };
-        let share = |j: usize| {
+        let Some((nats, settled, saved)) = tried.into_iter().next() else { continue };
+        let falls = |j: usize| {
             let (rich, poor) = (settled.fits[j].as_ref()?, fits[j].as_ref()?);
-            Some(1.0 - rich.cost / poor.cost.max(1e-300))
+            Some((poor.cost - rich.cost, least(rich.cost, perfect[j]), poor.cost))
         };
-        let share = (0..joints.len()).filter_map(share).fold(0.0, f64::max);
-        let relevant = share > RELEVANT || instead;
-        if nats > TAKEN && relevant && outcome.found.as_ref().is_none_or(|found| nats > found.nats) {
+        let falls: Vec<(f64, f64, f64)> = (0..joints.len()).filter_map(falls).collect();
+        let share = falls.iter().map(|(fall, _, poor)| fall / poor.max(1e-300)).fold(0.0, f64::max);
+        let relevant = falls.iter().any(|(fall, least, _)| fall > least) || saved > 0.0;
+        // Its numbers must lie off nothing as well: a fit may fall by what they do not do.
+        let nats = nats.min(settled.nats() - cost + saved);
+        let possible = !whole.at_bound(model, &settled.values);
+        if nats > TAKEN && relevant && possible && outcome.found.as_ref().is_none_or(|found| nats > found.nats) {
             let covariance = settled
                 .normal
                 .clone()

@@ -130,6 +130,16 @@ fn a_gain_that_is_not_the_given_one_is_claimed_and_the_given_one_is_not() {
     assert!((wrong.effects[0].parameters["gain"].at("b").unwrap().value - 3.0 / 4.5).abs() < 0.03);
 }
 
+#[test]
+fn a_servo_of_which_all_is_given_leaves_nothing_to_find() {
+    let model = model();
+    let logs = logs(&model, [6.0, 3.0], |_| {});
+    let text = "latency = 0\n[joint.a]\nstiffness = 6\ndamping = 0.36\n[joint.b]\nstiffness = 3\ndamping = 0.18\n";
+    let given = Given::from_toml(text, &["a".to_owned(), "b".to_owned()]).unwrap();
+    let diagnosis = diagnose(&model, &logs, &given, Vec::new(), &|_, _| {}).unwrap().diagnosis;
+    assert!(diagnosis.effects.is_empty() && diagnosis.verdict == "no_gap", "{diagnosis:?}");
+}
+
 fn of(diagnosis: &gapscope_servo::schema::Diagnosis, kind: &str, name: &str, joint: &str) -> f64 {
     let effect = diagnosis.effects.iter().find(|effect| effect.kind == kind);
     let effect = effect.unwrap_or_else(|| panic!("{kind} is not among {:?}", diagnosis.effects));

@@ -18,12 +18,8 @@ pub struct SpeedLimit {
 }
 
 impl SpeedLimit {
-    pub(crate) const CARD: Card = Card {
-        words: "speed limit",
-        meaning: "the drive turns no faster than this",
-        part: Part::Servo,
-        ..Card::BLANK
-    };
+    pub(crate) const CARD: Card =
+        Card { words: "speed limit", meaning: "the drive turns no faster than this", part: Part::Servo, ..Card::BLANK };
 
     /// Parameters under their public names.
     pub fn parameters(&self) -> Vec<Value> {

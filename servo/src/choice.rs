@@ -34,6 +34,17 @@ pub struct Comparison {
     pub last: bool,
 }
 
+/// An account of a joint without one of its kinds.
+#[derive(Debug, Clone)]
+pub struct Poorer {
+    /// The kind that it lacks.
+    pub kind: Kind,
+    /// Its kinds.
+    pub kinds: Vec<Kind>,
+    /// Its fit.
+    pub fit: Fit,
+}
+
 /// Kinds that are tried in earnest in each round.
 const TRIED: usize = 3;
 

@@ -1,6 +1,6 @@
 //! Which effects a joint has: kinds are added, exchanged and dropped while the score of the fit rises.
 
-use crate::choice::{Choice, Comparison, FULL, TAKEN, TRIAL, is_given};
+use crate::choice::{Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
 use crate::fit::{Fit, fit};
 use crate::kinds::Kind;
 use crate::law::Param;
@@ -32,6 +32,8 @@ pub struct Chosen {
     pub why: Vec<Comparison>,
     /// Independent samples that the errors are worth.
     pub samples: f64,
+    /// The account without its spring or play, where it has one.
+    pub poorer: Option<Poorer>,
 }
 
 /// Finds what one joint has. Leaves the weights of its runs as the last fit had them.
@@ -88,9 +90,9 @@ pub fn choose(joint: &mut Joint) -> Chosen {
     }
     choice.weigh(&best.law);
     best = choice.fit(&best.law, &kinds, None, FULL);
-    let mut kept = drop_needless(&choice, &mut kinds, &mut best, &mut why);
+    let (mut kept, mut poorer) = drop_needless(&choice, &mut kinds, &mut best, &mut why);
     if exchange(&choice, &mut kinds, &mut best, &possible, &mut why) {
-        kept = drop_needless(&choice, &mut kinds, &mut best, &mut why);
+        (kept, poorer) = drop_needless(&choice, &mut kinds, &mut best, &mut why);
     }
     let ties = ties(&choice, &kinds, &best, &possible);
     let samples = independent(choice.joint, &best.errors);
@@ -113,7 +115,7 @@ pub fn choose(joint: &mut Joint) -> Chosen {
         }
     }
     let unclaimed = found.iter().map(|f| f.0).filter(|kind| kind.needs_given() && !is_given(joint, *kind)).collect();
-    Chosen { fit: best, kinds: found, unclaimed, ties, why, samples }
+    Chosen { fit: best, kinds: found, unclaimed, ties, why, samples, poorer }
 }
 
 /// Whether a kind can be asked for at all.

@@ -28,6 +28,23 @@ pub fn nominal_rate(episodes: &[Episode]) -> Option<String> {
     ))
 }
 
+/// Steps of an encoder that a joint goes on by, from before a repeated sample to after it, where it does not rest.
+const GOES_ON: f64 = 4.0;
+
+/// Which samples repeat the one before in all joints while some joint goes on: readings that the recorder did not get.
+pub fn repeats(episode: &Episode) -> Vec<bool> {
+    let step = |row: &Vec<f64>| {
+        let changes = row.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min)
+    };
+    let rows: Vec<(&Vec<f64>, f64)> = episode.position.iter().map(|row| (row, step(row))).collect();
+    let is_one = |k: usize| {
+        let goes_on = |(row, step): &(&Vec<f64>, f64)| (row[k + 1] - row[k - 1]).abs() >= GOES_ON * step;
+        rows.iter().all(|(row, _)| row[k] == row[k - 1]) && rows.iter().any(goes_on)
+    };
+    (0..episode.len()).map(|k| k > 0 && k + 1 < episode.len() && is_one(k)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -46,5 +63,28 @@ mod tests {
         }
         assert!(nominal_rate(&[log(0.0, true), log(0.03, true)]).unwrap().contains("1 of 2 logs"));
         assert_eq!(nominal_rate(&[]), None);
+    }
+
+    #[test]
+    fn a_lost_reading_is_told_from_a_joint_that_rests() {
+        let tick = 1.5e-3;
+        let moves: Vec<f64> = (0..50).map(|k| tick * (5.0 * f64::from(k))).collect();
+        let creeps: Vec<f64> = (0..50).map(|k| tick * f64::from(k / 3)).collect();
+        let log = |rows: [&Vec<f64>; 2]| Episode {
+            time: (0..50).map(|k| 0.01 * f64::from(k)).collect(),
+            position: rows.map(Clone::clone).into(),
+            ..Episode::default()
+        };
+        let lost = |row: &Vec<f64>| {
+            let mut row = row.clone();
+            row[20] = row[19];
+            row
+        };
+        let at =
+            |log: &Episode| repeats(log).iter().enumerate().filter(|(_, is)| **is).map(|(k, _)| k).collect::<Vec<_>>();
+        assert_eq!(at(&log([&lost(&moves), &lost(&creeps)])), [20]);
+        // One joint alone that repeats may rest; all that creep rest between the steps of their encoders.
+        assert_eq!(at(&log([&lost(&moves), &moves])), [0; 0]);
+        assert_eq!(at(&log([&creeps, &creeps])), [0; 0]);
     }
 }

@@ -16,6 +16,7 @@ use crate::model::{ServoModel, ServoModelError};
 use crate::prepare::{Joint, joints};
 use crate::rest;
 use crate::schema::*;
+use crate::together::drop_what_the_arm_does_not_miss;
 use crate::whole::{Found, Whole, changed, look, surround};
 use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
@@ -62,6 +63,7 @@ pub fn diagnose(
     let (wholes, rivals) = find_wholes(model, episodes, &mut all, &mut chosen);
     let bodies: Vec<Effect> = wholes.iter().filter_map(|found| found.whole.effect(model, &found.values)).collect();
     let real = changed(model, &bodies).unwrap_or_else(|| model.clone());
+    drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
     findings.extend(
         all.iter()
             .filter(|joint| !joint.moved)

@@ -140,7 +140,7 @@ impl Kind {
     /// Puts it into a law where a fit of it begins, at so many times the scale of each parameter. A given gain or damping stays:
     /// a fit moves it from there. A given limit or dead band would never be felt where it stands.
     pub fn begin(self, law: &mut Law, start: f64, scale: &[f64; PARAMS], given: &[bool; PARAMS], inertia: f64) {
-        if matches!(self, Kind::Elasticity | Kind::Backlash) {
+        if self.turns_apart() {
             // A motor that turns on its own has a rotor; half of what it drives is a start.
             let rotor = 0.5 * law[Param::Scale] * inertia;
             law[Param::Armature] = law[Param::Armature].max(rotor);
@@ -192,6 +192,11 @@ impl Kind {
     /// Whether friction stands in for it in a fit that has friction before: both slow a joint down.
     pub fn hides(self) -> bool {
         matches!(self, Kind::Saturation | Kind::SpeedLimit)
+    }
+
+    /// Whether motor and link turn apart by it.
+    pub fn turns_apart(self) -> bool {
+        matches!(self, Kind::Elasticity | Kind::Backlash)
     }
 
     /// Whether the encoder may be on the link's side of it. The log does not say on which: both are tried.

@@ -28,6 +28,7 @@ mod rest;
 mod run;
 pub mod schema;
 mod simulate;
+mod together;
 mod weigh;
 mod whole;
 mod wind_up;

@@ -1,18 +1,18 @@
 //! What a fit does not miss is dropped; what could stand in the place of what stays is told.
 
-use crate::choice::{Choice, Comparison, FULL, TAKEN, TRIAL, is_given};
+use crate::choice::{Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
 use crate::fit::{Fit, normal};
 use crate::interval::Spread;
 use crate::kinds::Kind;
 use crate::weigh::independent;
 
-/// Drops what the fit does not miss; what stays, with the nats it is worth.
+/// Drops what the fit does not miss; what stays, with the nats it is worth, and the account without its spring or play.
 pub fn drop_needless(
     choice: &Choice,
     kinds: &mut Vec<Kind>,
     best: &mut Fit,
     why: &mut Vec<Comparison>,
-) -> Vec<(Kind, f64)> {
+) -> (Vec<(Kind, f64)>, Option<Poorer>) {
     loop {
         let samples = independent(choice.joint, &best.errors);
         let mut worth = Vec::new();
@@ -54,7 +54,9 @@ pub fn drop_needless(
         let Some(at) = needless else {
             why.extend(worth.iter().map(|w| Comparison { proposed: w.0, nats: w.1, taken: true, last: true }));
             why.extend(sure.iter().map(|s| Comparison { proposed: s.0, nats: s.1, taken: true, last: true }));
-            return worth.into_iter().map(|w| (w.0, w.1)).chain(sure).collect();
+            let kept = worth.iter().map(|w| (w.0, w.1)).chain(sure).collect();
+            let apart = worth.into_iter().find(|w| w.0.turns_apart());
+            return (kept, apart.map(|(kind, _, _, fit, kinds)| Poorer { kind, kinds, fit }));
         };
         let (kind, nats, _, poor, without) = worth.swap_remove(at);
         why.push(Comparison { proposed: kind, nats, taken: false, last: true });

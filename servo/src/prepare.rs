@@ -1,6 +1,7 @@
 //! Runs of each joint out of logs, and what their parameters may be.
 
 use crate::around::{derivatives, surroundings};
+use crate::clock::repeats;
 use crate::fit::Ranges;
 use crate::given::Given;
 use crate::law::{Law, PARAMS, Param};
@@ -121,7 +122,8 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 /// The joints of a model with their runs in logs.
 pub fn joints(model: &Model, episodes: &[Episode], given: &Given) -> Vec<Joint> {
     let around: Vec<_> = episodes.par_iter().map(|episode| surroundings(model, episode)).collect();
-    (0..model.dof()).into_par_iter().map(|j| joint(model, episodes, given, j, &around)).collect()
+    let stale: Vec<Vec<bool>> = episodes.iter().map(repeats).collect();
+    (0..model.dof()).into_par_iter().map(|j| joint(model, episodes, given, j, &around, &stale)).collect()
 }
 
 fn joint(
@@ -130,6 +132,7 @@ fn joint(
     given: &Given,
     j: usize,
     around: &[Vec<crate::run::Surroundings>],
+    stale: &[Vec<bool>],
 ) -> Joint {
     let name = model.joints()[j].name.clone();
     let signal = signal(episodes, j);
@@ -177,7 +180,8 @@ fn joint(
             seen_feedback: seen,
             around: around[log][j].clone(),
             mass: 0.0,
-            weight: vec![1.0; episode.len()],
+            weight: stale[log].iter().map(|stale| f64::from(u8::from(!stale))).collect(),
+            stale: stale[log].clone(),
             time,
             step: 5e-3,
             log,

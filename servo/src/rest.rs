@@ -24,7 +24,8 @@ pub fn structure(joint: &Joint, law: &Law) -> f64 {
         .iter()
         .map(|run| {
             simulate(law, run, &mut path);
-            path.iter().zip(&run.position).map(|(a, b)| a - b).collect()
+            let rows = path.iter().zip(&run.position).zip(&run.stale);
+            rows.map(|((a, b), stale)| if *stale { 0.0 } else { a - b }).collect()
         })
         .collect();
     let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
@@ -68,6 +69,7 @@ mod tests {
             around,
             mass: 0.01,
             weight: vec![1.0; count],
+            stale: vec![false; count],
             time,
             step: 5e-3,
             log: 0,

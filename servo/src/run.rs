@@ -120,6 +120,8 @@ pub struct Run {
     pub mass: f64,
     /// Weight of each sample's error; zero where it is not compared.
     pub weight: Vec<f64>,
+    /// Which samples repeat the one before while the arm moves: they are not compared.
+    pub stale: Vec<bool>,
     /// Samples at which the simulation starts anew from the log, in order: where no closed loop holds it to the log.
     pub restarts: Vec<usize>,
     /// Longest step of the integrator, s.

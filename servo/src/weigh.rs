@@ -78,13 +78,13 @@ pub fn weigh(joint: &mut Joint, law: &Law) {
         run.step = length;
         simulate(law, run, &mut path);
         let mut sums = [(0.0, 0.0); 2];
-        for k in 0..path.len() {
+        for k in (0..path.len()).filter(|&k| !run.stale[k]) {
             let sum = &mut sums[usize::from(run.on[k])];
             *sum = (sum.0 + (path[k] - run.position[k]).powi(2), sum.1 + 1.0);
         }
         let level = sums.map(|(square, count): (f64, f64)| (square / count.max(1.0)).sqrt() + step);
         for k in 0..path.len() {
-            run.weight[k] = step / level[usize::from(run.on[k])];
+            run.weight[k] = if run.stale[k] { 0.0 } else { step / level[usize::from(run.on[k])] };
         }
     }
 }

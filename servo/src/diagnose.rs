@@ -16,7 +16,7 @@ use crate::model::{ServoModel, ServoModelError};
 use crate::prepare::{Joint, joints};
 use crate::rest;
 use crate::schema::*;
-use crate::together::drop_what_the_arm_does_not_miss;
+use crate::together::{drop_what_the_arm_does_not_miss, is_missed};
 use crate::whole::{Found, Whole, changed, look, surround};
 use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
@@ -171,6 +171,10 @@ fn find_wholes(
         else {
             return (found, looked.ties);
         };
+        let before: Vec<Option<Law>> = chosen.iter().map(|c| c.as_ref().map(|c| c.fit.law)).collect();
+        if !is_missed(joints, (&there, &next.laws), (&real, &before)) {
+            return (found, looked.ties);
+        }
         real = there;
         surround(joints, &real, episodes);
         *chosen = choose_all(joints);

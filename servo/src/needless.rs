@@ -43,7 +43,9 @@ pub fn drop_needless(
             .filter(|(_, (_, nats, relevant, _, _))| *nats <= TAKEN || !relevant)
             .min_by(|a, b| a.1.1.total_cmp(&b.1.1))
             .map(|(at, _)| at);
+        // Each fit of a pair takes its time: where every kind is felt smoothly, one at a time is enough.
         if needless.is_none()
+            && kinds.iter().any(|kind| kind.is_threshold())
             && let Some((pair, nats, without, poor)) = needless_pair(choice, kinds, best, samples)
         {
             why.extend(pair.map(|proposed| Comparison { proposed, nats, taken: false, last: true }));

@@ -1,4 +1,4 @@
-//! Springs and play that a joint alone speaks for and the whole arm does not.
+//! What joints alone speak for and the whole arm does not: springs, play, a tilted base, a payload.
 //!
 //! A joint is fitted while the others move as they were measured. What their measured accelerations miss between samples
 //! jolts the joint, and a spring takes that over. In the free run of the whole arm the others' jolts come from their models:
@@ -15,13 +15,8 @@ use rayon::prelude::*;
 /// Takes springs and play out of the accounts of joints where the free run of the whole arm does not miss them.
 pub fn drop_what_the_arm_does_not_miss(model: &Model, joints: &[Joint], chosen: &mut [Option<Chosen>]) {
     for j in 0..joints.len() {
-        let Some(own) = chosen[j].as_mut() else { continue };
-        let Some(poorer) = own.poorer.take() else { continue };
-        let mut laws: Vec<Option<Law>> = joints
-            .iter()
-            .zip(chosen.iter())
-            .map(|(joint, c)| Some(c.as_ref().map_or(joint.start_still(), |c| c.fit.law)))
-            .collect();
+        let Some(poorer) = chosen[j].as_mut().and_then(|own| own.poorer.take()) else { continue };
+        let mut laws = laws(joints, chosen.iter().map(|c| c.as_ref().map(|c| c.fit.law)));
         let rich = squares(model, &laws, joints, j);
         laws[j] = Some(poorer.fit.law);
         let poor = squares(model, &laws, joints, j);
@@ -36,6 +31,24 @@ pub fn drop_what_the_arm_does_not_miss(model: &Model, joints: &[Joint], chosen: 
             own.fit = poorer.fit;
         }
     }
+}
+
+/// Whether the free run of the whole arm misses an effect of it: `with` and `without` are its bodies and its joints' laws.
+pub fn is_missed(joints: &[Joint], with: (&Model, &[Option<Law>]), without: (&Model, &[Option<Law>])) -> bool {
+    let all = |(model, own): (&Model, &[Option<Law>])| -> Vec<f64> {
+        let laws = laws(joints, own.iter().copied());
+        (0..joints.len()).map(|j| squares(model, &laws, joints, j)).collect()
+    };
+    let (rich, poor) = (all(with), all(without));
+    let perfect: Vec<f64> = joints.iter().map(|joint| tracking(joint).max(1e-300)).collect();
+    // Each joint by its own tracking error, so that a wrist counts as much as a shoulder.
+    let of = |squares: &[f64]| squares.iter().zip(&perfect).map(|(square, perfect)| square / perfect).sum::<f64>();
+    of(&poor) - of(&rich) > least(of(&rich), joints.len() as f64)
+}
+
+/// Laws of all joints; a joint without one stands still or is the bare model's.
+fn laws(joints: &[Joint], own: impl Iterator<Item = Option<Law>>) -> Vec<Option<Law>> {
+    joints.iter().zip(own).map(|(joint, own)| Some(own.unwrap_or(joint.start_still()))).collect()
 }
 
 /// Squared error of a joint in the free run of the arm, by the weights of its samples; infinite where the run ends early.

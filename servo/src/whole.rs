@@ -55,6 +55,8 @@ pub struct Found {
     pub nats: f64,
     /// Share of the squared error that it takes away where it takes most.
     pub share: f64,
+    /// The joints' laws beside it.
+    pub laws: Vec<Option<Law>>,
 }
 
 impl Whole {
@@ -183,13 +185,6 @@ impl Settled {
 }
 
 impl Search<'_> {
-    fn fits(&self, joints: &[Joint], accounts: &[Option<Account>], steps: usize) -> Vec<Option<Fit>> {
-        let one = |(joint, account): (&Joint, &Option<Account>)| {
-            account.as_ref().map(|a| fit(&a.law, &a.free, &joint.runs, &joint.ranges, steps))
-        };
-        joints.par_iter().zip(accounts).map(one).collect()
-    }
-
     /// N and g at fits of the joints as they are surrounded now, by `base`.
     fn equations(&self, joints: &mut [Joint], fits: &[Option<Fit>], base: &Around) -> (DMatrix<f64>, DVector<f64>) {
         let p = self.probes.len();
@@ -248,7 +243,7 @@ impl Search<'_> {
         let mut accounts = accounts.to_vec();
         let mut base = self.plain.clone();
         put(joints, &base);
-        let mut fits = self.fits(joints, &accounts, LOCAL);
+        let mut fits = fit_all(joints, &accounts, LOCAL);
         let mut values = vec![0.0; self.probes.len()];
         let mut best: Option<(f64, Settled)> = None;
         for _ in 0..STEPS {
@@ -266,7 +261,7 @@ impl Search<'_> {
                     account.law = fit.law;
                 }
             }
-            fits = self.fits(joints, &accounts, LOCAL);
+            fits = fit_all(joints, &accounts, LOCAL);
             let score = misfit(joints, &fits);
             match &best {
                 Some((least, _)) if score > least - 0.5 => break,
@@ -275,6 +270,14 @@ impl Search<'_> {
         }
         best.map(|(_, settled)| settled)
     }
+}
+
+/// A fit of each joint's account, by so many steps at most.
+fn fit_all(joints: &[Joint], accounts: &[Option<Account>], steps: usize) -> Vec<Option<Fit>> {
+    let one = |(joint, account): (&Joint, &Option<Account>)| {
+        account.as_ref().map(|a| fit(&a.law, &a.free, &joint.runs, &joint.ranges, steps))
+    };
+    joints.par_iter().zip(accounts).map(one).collect()
 }
 
 /// Surroundings of `base` with the change from `plain` to `probed` on top.
@@ -330,6 +333,10 @@ pub fn look(
         let count = |account: &Option<Account>| account.as_ref().map_or(0, |a| a.free.len());
         (count(&beside[j]) - count(&instead[j])) as f64
     };
+    put(joints, &plain);
+    let perfect: Vec<f64> = joints.iter().map(tracking).collect();
+    // What more steps of the same account take away speaks for no effect.
+    let fits = fit_all(joints, &beside, STEPS * LOCAL);
     let mut outcome = Outcome { found: None, ties: Vec::new() };
     for whole in Whole::ALL.into_iter().filter(|whole| !without.contains(whole)) {
         let probes = whole.probes(model);
@@ -355,9 +362,6 @@ pub fn look(
         let Some(probed) = probed else { continue };
         let search = Search { whole, model, episodes, plain: &plain, probed: &probed, probes: &probes };
         put(joints, &plain);
-        let perfect: Vec<f64> = joints.iter().map(tracking).collect();
-        // What more steps of the same account take away speaks for no effect.
-        let fits = search.fits(joints, &beside, STEPS * LOCAL);
         let price = |fits: &[Option<Fit>]| {
             let samples: f64 = joints
                 .iter()
@@ -405,7 +409,8 @@ pub fn look(
                 .clone()
                 .try_inverse()
                 .unwrap_or_else(|| DMatrix::from_diagonal_element(probes.len(), probes.len(), 1e6));
-            outcome.found = Some(Found { whole, values: settled.values, covariance, nats, share });
+            let laws = settled.fits.iter().map(|fit| fit.as_ref().map(|fit| fit.law)).collect();
+            outcome.found = Some(Found { whole, values: settled.values, covariance, nats, share, laws });
         }
     }
     put(joints, &plain);

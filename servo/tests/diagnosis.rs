@@ -285,3 +285,33 @@ fn the_pendulum_at_one_gain_foretells_another() {
     // Published laws with and without friction under load reach .100 and .128 rad rms, .068 and .090 mean absolute.
     assert!(evaluation.after["servo"] < 0.100 && evaluation.mean_absolute.unwrap() < 0.068, "{evaluation:?}");
 }
+
+/// Pooled rms of the arm's joints without the gripper, of the free run after and before, rad.
+fn pooled(rms: &std::collections::BTreeMap<String, f64>) -> f64 {
+    let own: Vec<f64> = rms.iter().filter(|(joint, _)| joint.as_str() != "gripper").map(|(_, rms)| rms * rms).collect();
+    (own.iter().sum::<f64>() / own.len() as f64).sqrt()
+}
+
+#[test]
+#[ignore = "six minutes of six servos take minutes: cargo test --release -p gapscope-servo -- --ignored"]
+fn three_runs_of_a_hobby_arm_foretell_the_other_three_both_ways() {
+    let Some(folder) = real("so101") else { return };
+    let model = Model::from_urdf(&std::fs::read_to_string(folder.join("robot.urdf")).unwrap()).unwrap().model;
+    let options = ReadOptions { without_effort: true, drop_bad_channels: true, ..ReadOptions::default() };
+    let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+    let read = |motions: [&str; 3]| {
+        let paths = motions.map(|motion| folder.join(format!("{motion}.csv.gz")));
+        read_logs(&paths, &names, &options).unwrap().0
+    };
+    let moves = read(["backlash_detection", "chirp_sweep", "step_response"]);
+    let holds = read(["friction_gravity", "static_holding", "velocity_ramp"]);
+    for (own, other) in [(&moves, &holds), (&holds, &moves)] {
+        let given = Given::default();
+        let outcome = diagnose(&model, own, &given, Vec::new(), &|_, _| {}).unwrap();
+        let (evaluation, _) = evaluate(&model, other, &given, Some(&outcome.corrected)).unwrap();
+        let (before, after) = (pooled(&evaluation.gap.position.rms), pooled(&evaluation.after));
+        let kinds: Vec<&str> = outcome.diagnosis.effects.iter().map(|effect| effect.kind.as_str()).collect();
+        eprintln!("so101 {:.2} of {:.2} mrad, {:.3}: {kinds:?}", 1e3 * after, 1e3 * before, after / before);
+        assert!(after <= 0.40 * before, "{after} of {before}");
+    }
+}

@@ -1,7 +1,7 @@
 //! `gapscope rollout`: how the models' errors grow over the horizon, beside what one-step errors allow.
 
 use crate::cli::{Input, Kind};
-use crate::input::{Loaded, load, strangeness, warn};
+use crate::input::{Loaded, load_any, strangeness, warn};
 use crate::learned;
 use crate::output;
 use crate::report::terminal::{fill, pad};
@@ -63,7 +63,7 @@ pub struct Rollout {
 /// Bad input, or a page that exists or cannot be written.
 pub fn run(args: &Rollout) -> Result<String> {
     options(args)?;
-    let loaded = load(&args.input)?;
+    let loaded = load_any(&args.input, None, &|_| {})?;
     if servo::lacks_effort(&loaded) {
         loaded.warn();
         return servo::rolled(args, &loaded);

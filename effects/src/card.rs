@@ -72,6 +72,8 @@ pub enum Part {
     Calibration,
     /// What an owner looks for.
     Further,
+    /// What a servo can have against the drive that was given. It acts on set points.
+    Servo,
     /// A law that the catalogue does not have: what its effects are held against.
     Outside,
 }

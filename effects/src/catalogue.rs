@@ -5,6 +5,7 @@ mod actuator_lag;
 mod armature;
 mod backlash;
 mod coulomb_friction;
+mod dead_band;
 mod external_contact;
 mod gravity_misalignment;
 mod joint_coupling;
@@ -15,6 +16,9 @@ mod load_dependent_friction;
 mod parallel_spring;
 mod payload;
 mod presliding_friction;
+mod servo_damping_error;
+mod servo_gain_error;
+mod speed_limit;
 mod stribeck_friction;
 mod thermal_drift;
 mod torque_bias;
@@ -38,9 +42,11 @@ use serde::{Deserialize, Serialize};
 macro_rules! effects {
     (
         effects { $($(#[$about:meta])* $file:ident $type:ident $number:literal,)* }
+        servo { $($(#[$about_servo:meta])* $servo_file:ident $servo:ident $servo_number:literal,)* }
         outside { $($(#[$about_law:meta])* $law_file:ident $law:ident $law_number:literal,)* }
     ) => {
         $(pub use $file::$type;)*
+        $(pub use $servo_file::$servo;)*
 
         /// One unmodelled effect with its parameters. Joints are named as in the URDF; serde writes the public names.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -75,6 +81,7 @@ macro_rules! effects {
             fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<Effect> {
                 match candidate.kind {
                     $(Kind::$type => $type::from_coefficients(candidate, model, coefficients).map(Effect::$type),)*
+                    $(Kind::$servo => None,)*
                     $(Kind::$law => None,)*
                 }
             }
@@ -85,6 +92,7 @@ macro_rules! effects {
             pub fn card(self) -> &'static Card {
                 match self {
                     $(Kind::$type => const { &<$type as Signature>::CARD },)*
+                    $(Kind::$servo => const { &$servo::CARD },)*
                     $(Kind::$law => const { &<outside::$law_file::$law as Signature>::CARD },)*
                 }
             }
@@ -95,6 +103,8 @@ macro_rules! effects {
             pub fn columns(&self, motion: &Motion) -> Vec<Column> {
                 match self.kind {
                     $(Kind::$type => $type::columns(self, motion),)*
+                    // They act on set points, which a motion of efforts does not have.
+                    $(Kind::$servo => Vec::new(),)*
                     $(Kind::$law => outside::$law_file::$law::columns(self, motion),)*
                 }
             }
@@ -104,6 +114,7 @@ macro_rules! effects {
             pub fn scales(&self, model: &Model) -> Option<Vec<f64>> {
                 match self.kind {
                     $(Kind::$type => $type::scales(self, model),)*
+                    $(Kind::$servo => None,)*
                     $(Kind::$law => outside::$law_file::$law::scales(self, model),)*
                 }
             }

@@ -1,4 +1,5 @@
 //! The list of the catalogue. Everything that names all kinds is made of it.
+//! `effects` act on efforts, `servo` on set points; `outside` are laws that effects are held against.
 
 /// Hands the list to a macro: of each kind its file, which is its public name, its type, and its number. A number is never
 /// given twice. It orders kinds where a climb goes through them: what every used robot has comes first.
@@ -50,6 +51,16 @@ macro_rules! catalogue {
                 external_contact ExternalContact 21,
                 /// Friction or inertia on a sum of two joint speeds.
                 joint_coupling JointCoupling 9,
+            }
+            servo {
+                /// A servo's proportional gain differs from the one given.
+                servo_gain_error ServoGainError 27,
+                /// A servo's derivative gain or back-EMF differs from the one given.
+                servo_damping_error ServoDampingError 28,
+                /// The drive does not turn faster.
+                speed_limit SpeedLimit 29,
+                /// A servo does nothing within a small error.
+                dead_band DeadBand 30,
             }
             outside {
                 /// Outside the catalogue: drag of a medium on a link.

@@ -98,6 +98,8 @@ pub enum Study {
     Policy(Learning),
     /// Logs of real machines: what is found, against what was published
     RealLogs(RealLogs),
+    /// Logs of real servo arms, without torque: identified on some, tried on the others
+    ServoLogs(RealLogs),
     /// Several logs of one machine, each diagnosed alone: whether the answers agree
     Agreement(RealLogs),
 }
@@ -108,7 +110,7 @@ pub enum Study {
   gapscope study real-logs --data logs --force
   gapscope study agreement --data logs --force")]
 pub struct RealLogs {
-    /// Folder of the logs, a folder each: emps, tx40, kinova_gen3, double_pendulum, kuka_lwr4
+    /// Folder of the logs, a folder each: emps, tx40, kinova_gen3, double_pendulum, kuka_lwr4, xl330_pendulum, so101
     #[arg(long, value_name = "DIR")]
     pub data: PathBuf,
     /// Folder for the pages and their pictures
@@ -183,6 +185,10 @@ pub struct MakeBank {
     /// none; 2 for arms that are off by more. `--cases` counts them [default: each further kind once]
     #[arg(long, value_name = "1|2", num_args = 0..=1, default_missing_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
     pub used: Option<u8>,
+    /// Servo arms of 1 to 7 joints, drawn themselves, whose logs hold set points and no torque; half of them with the simulator's
+    /// servo given. `--cases` counts them all: a third has one effect, a third several, the rest an unknown one or none
+    #[arg(long, conflicts_with_all = ["used", "faulty", "robots"])]
+    pub servo: bool,
     /// Spoil the logs of two cases in three by one fault drawn at random: a unit, a sign, a clock, an effort not recorded, …
     #[arg(long)]
     pub faulty: bool,

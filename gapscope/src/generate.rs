@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use gapscope_datasets::{Episode, Perturbation, Recipe, Reference, Sensors, Trajectory, follow, generate, write_csv};
 use gapscope_dynamics::{Model, robots};
 use gapscope_effects::{Effect, Plant};
+use gapscope_servo::ServoModel;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -31,6 +32,9 @@ struct Truth<'a> {
     trajectory: Option<String>,
     perturbation: Option<Perturbation>,
     effects: &'a [Effect],
+    /// The servo arm that was simulated, drives included.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    corrected: Option<&'a ServoModel>,
 }
 
 /// Simulates and writes the logs; returns what to print.
@@ -38,7 +42,8 @@ struct Truth<'a> {
 /// # Errors
 /// A robot or effects that cannot be read or do not go together, a number that cannot be, files that exist.
 pub fn run(args: &Generate) -> Result<String> {
-    let Plan { urdf, model, effects, perturbation, recipe, reference } = plan(args)?;
+    let plan = plan(args)?;
+    let Plan { urdf, model, effects, perturbation, recipe, .. } = &plan;
     let out = match &args.out {
         Some(out) => out.clone(),
         None => output::new_folder(Path::new(""), "gapscope-logs")?,
@@ -55,21 +60,30 @@ pub fn run(args: &Generate) -> Result<String> {
 
     let bar = bar(args.episodes);
     logs.par_iter().enumerate().try_for_each(|(i, file)| -> Result<()> {
-        let log = episode(&model, &effects, args.seed, i as u64, &recipe, reference.as_ref())?;
+        let log = plan.episode(args.seed, i as u64)?;
         // Not before: what cannot be simulated leaves no folder behind.
         std::fs::create_dir_all(&out).with_context(|| format!("cannot make the folder {}", out.display()))?;
         write_csv(file, &log, args.force)?;
         bar.inc(1);
         Ok(())
     })?;
-    output::write(&urdf_file, &urdf)?;
+    output::write(&urdf_file, urdf)?;
     bar.finish_and_clear();
     let (robot, seed, episodes) = (model.name(), args.seed, args.episodes);
     let trajectory = args.trajectory.as_ref().map(|file| file.display().to_string());
-    let truth =
-        Truth { schema: TRUTH_SCHEMA, robot, seed, episodes, recipe, trajectory, perturbation, effects: &effects };
+    let truth = Truth {
+        schema: TRUTH_SCHEMA,
+        robot,
+        seed,
+        episodes,
+        recipe: *recipe,
+        trajectory,
+        perturbation: *perturbation,
+        effects,
+        corrected: plan.servo.as_ref(),
+    };
     output::write(&truth_file, &(serde_json::to_string_pretty(&truth)? + "\n"))?;
-    Ok(told(&model, &effects, args, &recipe, &out))
+    Ok(told(model, effects, args, recipe, &out))
 }
 
 /// What is to be simulated.
@@ -81,6 +95,8 @@ struct Plan {
     recipe: Recipe,
     /// The motion that is followed instead of one of the recipe.
     reference: Option<Reference>,
+    /// The servo arm, where the effects are a corrected one's.
+    servo: Option<ServoModel>,
 }
 
 /// Simulates and writes nothing: the robot's URDF, the effects that its logs hold, and the logs.
@@ -88,11 +104,10 @@ struct Plan {
 /// # Errors
 /// As [`run`], but for files.
 pub fn simulated(args: &Generate) -> Result<(String, Vec<Effect>, Vec<Episode>)> {
-    let Plan { urdf, model, effects, recipe, reference, .. } = plan(args)?;
+    let plan = plan(args)?;
     let numbers: Vec<u64> = (0..args.episodes).collect();
-    let one = |&i: &u64| episode(&model, &effects, args.seed, i, &recipe, reference.as_ref());
-    let episodes = numbers.par_iter().map(one).collect::<Result<_>>()?;
-    Ok((urdf, effects, episodes))
+    let episodes = numbers.par_iter().map(|&i| plan.episode(args.seed, i)).collect::<Result<_>>()?;
+    Ok((plan.urdf, plan.effects, episodes))
 }
 
 fn plan(args: &Generate) -> Result<Plan> {
@@ -121,7 +136,13 @@ fn plan(args: &Generate) -> Result<Plan> {
         recipe.seconds = trajectory.duration();
     }
     let reference = trajectory.as_ref().map(Reference::along);
-    Ok(Plan { urdf, model, effects, perturbation, recipe, reference })
+    let servo = args.effects.as_deref().map(|file| read_servo(file, &model)).transpose()?.flatten();
+    if servo.is_some() && perturbation.is_some() {
+        bail!(
+            "--perturb changes efforts, and a servo arm has set points; leave it out, or give effects without a drive"
+        );
+    }
+    Ok(Plan { urdf, model, effects, perturbation, recipe, reference, servo })
 }
 
 /// The robot's URDF and model: a file's, or a built-in one's where there is no file of the name.
@@ -151,6 +172,18 @@ fn read_effects(file: &Path) -> Result<Vec<Effect>> {
     serde_json::from_value(list).with_context(|| {
         format!(r#"{name} is not a list of effects like [{{"kind": "torque_bias", "bias": {{"joint1": 0.5}}}}]"#)
     })
+}
+
+/// The servo arm of a corrected model that has a drive, or of the truth of logs that were made with one.
+fn read_servo(file: &Path, model: &Model) -> Result<Option<ServoModel>> {
+    let name = || file.display().to_string();
+    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read the effects {}", name()))?;
+    let value: serde_json::Value = serde_json::from_str(&text).with_context(|| format!("{} is not JSON", name()))?;
+    let text = value.get("corrected").map_or(text, serde_json::Value::to_string);
+    if !ServoModel::is_one(&text) {
+        return Ok(None);
+    }
+    ServoModel::from_json(&text, model).map(Some).with_context(name)
 }
 
 fn recipe(args: &Generate) -> Recipe {
@@ -183,6 +216,46 @@ fn read_trajectory(file: &Path, model: &Model) -> Result<Trajectory> {
     Trajectory::from_csv(&text, &joints).with_context(|| format!("{name} is not a trajectory of {}", model.name()))
 }
 
+impl Plan {
+    fn episode(&self, seed: u64, index: u64) -> Result<Episode> {
+        match &self.servo {
+            Some(servo) => servo_episode(self, servo, seed, index),
+            None => episode(&self.model, &self.effects, seed, index, &self.recipe, self.reference.as_ref()),
+        }
+    }
+}
+
+/// Seeds of neighbouring data sets must not share episodes.
+fn seed_of(seed: u64, index: u64) -> u64 {
+    seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index)
+}
+
+/// A log of a servo arm: the motion is its set points, and its encoder has the recipe's step.
+fn servo_episode(plan: &Plan, servo: &ServoModel, seed: u64, index: u64) -> Result<Episode> {
+    let Plan { model, recipe, .. } = plan;
+    let drawn;
+    let reference = match &plan.reference {
+        Some(reference) => reference,
+        None => {
+            drawn = Reference::draw(recipe.motion, model, seed_of(seed, index), recipe.speed, recipe.seconds)?;
+            &drawn
+        }
+    };
+    let samples = (recipe.seconds * recipe.rate).round().max(2.0) as usize;
+    let time: Vec<f64> = (0..samples).map(|k| k as f64 / recipe.rate).collect();
+    let mut set_points = vec![Vec::with_capacity(samples); model.dof()];
+    for &t in &time {
+        let (q, _, _) = reference.at(t);
+        set_points.iter_mut().zip(q).for_each(|(row, q)| row.push(q));
+    }
+    let mut log = gapscope_servo::follow(model, servo, &format!("episode_{index}.csv"), time, set_points)?;
+    let step = recipe.sensors.encoder_step;
+    if step > 0.0 {
+        log.position.iter_mut().flatten().for_each(|q| *q = (*q / step).round() * step);
+    }
+    Ok(log)
+}
+
 fn episode(
     model: &Model,
     effects: &[Effect],
@@ -191,8 +264,7 @@ fn episode(
     recipe: &Recipe,
     reference: Option<&Reference>,
 ) -> Result<Episode> {
-    // Seeds of neighbouring data sets must not share episodes.
-    let seed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index);
+    let seed = seed_of(seed, index);
     let name = format!("episode_{index}.csv");
     let log = match reference {
         None => generate(model, effects, seed, recipe, &name),
@@ -245,6 +317,40 @@ mod tests {
             Command::Generate(args) => run(&args),
             _ => unreachable!(),
         }
+    }
+
+    #[test]
+    fn a_corrected_servo_arm_follows_its_set_points_and_its_truth_makes_it_again() {
+        let dir = tempfile::tempdir().unwrap();
+        let drive = |stiffness: f64| {
+            format!(
+                r#"{{"follows": "command", "torque_per_unit": {stiffness}, "feedback": 1.0, "damping": 4.0, "latency": 0.01,
+                    "limit": null, "speed_limit": null, "dead_band": 0.0}}"#
+            )
+        };
+        let corrected = format!(
+            r#"{{"schema": "gapscope.model/1", "robot": "double_pendulum", "weights": {{"joint1": 1.0, "joint2": 1.0}},
+                "effects": [{{"kind": "coulomb_friction", "coulomb": {{"joint1": 0.2}}}}],
+                "drive": {{"joint1": {}, "joint2": {}}}}}"#,
+            drive(80.0),
+            drive(40.0)
+        );
+        let file = dir.path().join("corrected.json");
+        std::fs::write(&file, corrected).unwrap();
+        let [a, b] = ["a", "b"].map(|name| dir.path().join(name));
+        let line = |effects: &Path| {
+            format!(
+                "double_pendulum --effects {} --episodes 1 --seconds 2 --rate 50 --encoder-step 0.001",
+                effects.display()
+            )
+        };
+        generated(&line(&file), &a).unwrap();
+        let log = std::fs::read_to_string(a.join("episode_0.csv")).unwrap();
+        assert!(log.starts_with("time,position.joint1,position.joint2,command.joint1,command.joint2\n"), "{log}");
+        generated(&line(&a.join("truth.json")), &b).unwrap();
+        assert_eq!(bytes(&a)[0], bytes(&b)[0]);
+        let perturbed = generated(&format!("{} --perturb", line(&file)), &dir.path().join("c")).unwrap_err();
+        assert!(perturbed.to_string().contains("--perturb"), "{perturbed}");
     }
 
     fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {

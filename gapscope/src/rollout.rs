@@ -1,11 +1,12 @@
 //! `gapscope rollout`: how the models' errors grow over the horizon, beside what one-step errors allow.
 
 use crate::cli::{Input, Kind};
-use crate::input::{Loaded, load, strangeness, warn};
+use crate::input::{Loaded, load_any, strangeness, warn};
 use crate::learned;
 use crate::output;
 use crate::report::terminal::{fill, pad};
 use crate::report::{figure, plain, rollout_page, significant};
+use crate::servo;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use gapscope_diagnosis::{BoundGrowth, Contender, Corrected, ModelRollouts, RolloutOptions, rollouts};
@@ -27,6 +28,9 @@ pub struct Rollout {
     /// Corrected model that `diagnose` wrote
     #[arg(long, value_name = "FILE")]
     pub with: Option<PathBuf>,
+    /// What is known of the drives, where the logs hold no torque: a TOML file
+    #[arg(long, value_name = "FILE")]
+    pub drive: Option<PathBuf>,
     /// Residual network that `train residual` wrote, on the robot's own model: its folder, or weights in it
     #[arg(long, value_name = "DIR|FILE")]
     pub residual: Option<PathBuf>,
@@ -59,6 +63,11 @@ pub struct Rollout {
 /// Bad input, or a page that exists or cannot be written.
 pub fn run(args: &Rollout) -> Result<String> {
     options(args)?;
+    let loaded = load_any(&args.input, None, &|_| {})?;
+    if servo::lacks_effort(&loaded) {
+        loaded.warn();
+        return servo::rolled(args, &loaded);
+    }
     let first = args.input.logs.first().context("no log is given")?;
     let page = match &args.out {
         Some(file) if file.exists() && !args.force => {
@@ -70,7 +79,6 @@ pub fn run(args: &Rollout) -> Result<String> {
     if let Some(folder) = page.parent() {
         output::writable(folder)?;
     }
-    let loaded = load(&args.input)?;
     loaded.warn();
     let progress = ProgressBar::new_spinner().with_message("rolling out");
     progress.enable_steady_tick(Duration::from_millis(120));
@@ -274,6 +282,7 @@ mod tests {
                 ..Input::default()
             },
             with: None,
+            drive: None,
             residual: None,
             pure: None,
             horizon: 0.5,

@@ -5,6 +5,7 @@ mod summary;
 use crate::cli::{Diagnose, Evaluate};
 use crate::input::Loaded;
 use crate::report::{self, Beside};
+use crate::rollout::Rollout;
 use anyhow::{Context, Result, bail};
 use gapscope_servo::schema::Evaluation;
 use gapscope_servo::{Given, Outcome, Paths, ServoModel};
@@ -52,25 +53,54 @@ pub fn files(outcome: &Outcome, beside: &Beside, out: &Path) -> Result<Vec<(&'st
     ])
 }
 
+/// The corrected servo arm of a file, where one is given.
+fn corrected(file: Option<&Path>, loaded: &Loaded) -> Result<Option<ServoModel>> {
+    let Some(file) = file else { return Ok(None) };
+    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+    if !ServoModel::is_one(&text) {
+        bail!(
+            "{}: the logs hold no torque, but this corrected model has no `drive`; use one that `gapscope diagnose` made of logs without torque",
+            file.display()
+        );
+    }
+    Ok(Some(ServoModel::from_json(&text, &loaded.model).with_context(|| file.display().to_string())?))
+}
+
+/// Rolls a servo arm's models out under the set points of logs; returns what to print.
+///
+/// # Errors
+/// A file that cannot be read or does not fit the robot or the logs; networks, which need a torque.
+pub fn rolled(args: &Rollout, loaded: &Loaded) -> Result<String> {
+    if args.residual.is_some() || args.pure.is_some() {
+        bail!("the logs hold no torque: --residual and --pure step by it; leave them out");
+    }
+    let given = given(args.drive.as_deref(), loaded)?;
+    let corrected = corrected(args.with.as_deref(), loaded)?;
+    let (model, episodes) = (&loaded.model, &loaded.episodes);
+    let growth = gapscope_servo::rollouts(model, episodes, &given, corrected.as_ref(), args.horizon, args.starts)?;
+    let mut text = format!(
+        "{} · rollouts under the set points, error of all joints' positions together, mrad: median (90 %)\n\n{:12}{:>10}{:>24}{:>24}\n",
+        model.name(),
+        "horizon, s",
+        "rollouts",
+        "nominal",
+        if corrected.is_some() { "corrected" } else { "" }
+    );
+    let cell = |[median, high]: [f64; 2]| format!("{:.2} ({:.2})", 1e3 * median, 1e3 * high);
+    for row in growth {
+        let after = row.corrected.map_or(String::new(), cell);
+        let _ = writeln!(text, "{:<12.3}{:>10}{:>24}{:>24}", row.horizon, row.starts, cell(row.nominal), after);
+    }
+    Ok(text)
+}
+
 /// Evaluates a servo arm's model.
 ///
 /// # Errors
 /// A file that cannot be read or does not fit the robot or the logs.
 pub fn evaluated(args: &Evaluate, loaded: &Loaded) -> Result<(Evaluation, Paths)> {
     let given = given(args.drive.as_deref(), loaded)?;
-    let corrected = match &args.with {
-        Some(file) => {
-            let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-            if !ServoModel::is_one(&text) {
-                bail!(
-                    "{}: the logs hold no torque, but this corrected model has no `drive`; use one that `gapscope diagnose` made of logs without torque",
-                    file.display()
-                );
-            }
-            Some(ServoModel::from_json(&text, &loaded.model).with_context(|| file.display().to_string())?)
-        }
-        None => None,
-    };
+    let corrected = corrected(args.with.as_deref(), loaded)?;
     Ok(gapscope_servo::evaluate(&loaded.model, &loaded.episodes, &given, corrected.as_ref())?)
 }
 

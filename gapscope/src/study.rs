@@ -4,6 +4,7 @@ mod agreement;
 mod closed_loop;
 mod learning;
 mod real_logs;
+mod servo_logs;
 
 use crate::cli::Study;
 use anyhow::Result;
@@ -22,5 +23,6 @@ pub fn run(study: &Study) -> Result<String> {
         Study::Policy(args) => learning::run(Topic::Policy, args),
         Study::Agreement(args) => agreement::run(args),
         Study::RealLogs(args) => real_logs::run(args),
+        Study::ServoLogs(args) => servo_logs::run(args),
     }
 }

@@ -3,22 +3,49 @@
 //! Each step solves (M/h + D) v⁺ = rhs − friction by sweeps over the joints, each joint with its own law and its own dry
 //! friction (projected Gauss–Seidel, as in Moreau's time stepping). Rows are in units of what each drive follows.
 
-use crate::law::{Law, Order, Param};
+use crate::law::{Law, Order, Param, Row};
 use crate::prepare::Joint;
+use crate::wind_up::{Shaft, Wound};
 use gapscope_dynamics::{Data, Model};
 use nalgebra::DMatrix;
+use std::ops::Range;
 
 /// Sweeps of a step; they end earlier once no speed changes by more than a part in 10¹⁰ of the fastest.
 const SWEEPS: usize = 40;
 const SETTLED: f64 = 1e-10;
+
+/// What the encoder of a joint shows whose motor and link turn apart, rad.
+fn shown(state: &Wound, law: &Law) -> f64 {
+    if law.link_side { state.link[0] } else { state.motor[0] }
+}
 
 /// Positions of all joints at the samples of a log, `[joint][sample]`, rad, from the first measured ones at rest. A joint
 /// without a law follows its set point perfectly while its motor is on, and is the bare model's while it is off.
 ///
 /// Positions that cannot be, of a law that is no servo's, end the simulation: the rest is NaN.
 pub fn simulate_arm(model: &Model, laws: &[Option<Law>], joints: &[Joint], log: usize) -> Vec<Vec<f64>> {
+    let samples = joints.first().map_or(0, |joint| joint.runs[log].time.len());
+    simulate_span(model, laws, joints, log, 0..samples)
+}
+
+/// The same over some samples of a log, from the state that the log shows at the first of them; at rest at the first of all.
+pub fn simulate_span(
+    model: &Model,
+    laws: &[Option<Law>],
+    joints: &[Joint],
+    log: usize,
+    span: Range<usize>,
+) -> Vec<Vec<f64>> {
     let n = model.dof();
+    if span.is_empty() {
+        return vec![Vec::new(); n];
+    }
     let time = &joints[0].runs[log].time;
+    let first = span.start;
+    let start: Vec<(f64, f64)> = joints
+        .iter()
+        .map(|joint| if first == 0 { (joint.runs[log].position[0], 0.0) } else { joint.runs[log].state(first) })
+        .collect();
     let mut data = Data::new(model);
     let mut mass = DMatrix::zeros(n, n);
     let bare = {
@@ -26,14 +53,34 @@ pub fn simulate_arm(model: &Model, laws: &[Option<Law>], joints: &[Joint], log: 
         law[Param::Scale] = 1.0;
         law
     };
-    let mut q: Vec<f64> = joints.iter().map(|joint| joint.runs[log].position[0]).collect();
-    let mut v = vec![0.0; n];
+    let mut q: Vec<f64> = start.iter().map(|start| start.0).collect();
+    let mut v: Vec<f64> = start.iter().map(|start| start.1).collect();
+    let mut path: Vec<Vec<f64>> = q.iter().map(|&q| vec![q]).collect();
     let [mut turned, mut bias, mut end, mut load, mut push, mut factor, mut bound, mut delivered] =
         std::array::from_fn(|_| vec![0.0; n]);
     let mut hints = vec![0; n];
-    let mut path: Vec<Vec<f64>> = q.iter().map(|&q| vec![q]).collect();
+    let shafts: Vec<Option<Shaft>> =
+        (0..n).map(|j| laws[j].and_then(|law| law.shaft(joints[j].runs[log].mass))).collect();
+    let mut data_at_rest = vec![0.0; n];
+    if shafts.iter().any(Option::is_some) {
+        model.gravity_torque(&mut data, &q, &mut data_at_rest);
+    }
+    // Of joints whose motor and link turn apart, q and v are the link's.
+    let mut wound: Vec<Option<Wound>> = (0..n)
+        .map(|j| {
+            let (shaft, law) = (shafts[j]?, laws[j]?);
+            let mut state = shaft.at_rest(q[j], law[Param::Scale] * data_at_rest[j], law.link_side);
+            (state.motor[1], state.link[1]) = (v[j], v[j]);
+            Some(state)
+        })
+        .collect();
+    let mut next = wound.clone();
+    let mut rows: Vec<Option<Row>> = vec![None; n];
+    for (q, state) in q.iter_mut().zip(&wound) {
+        *q = state.map_or(*q, |state| state.link[0]);
+    }
     let step = joints.iter().map(|joint| joint.runs[log].step).fold(f64::INFINITY, f64::min);
-    for k in 0..time.len() - 1 {
+    for k in first..span.end - 1 {
         let dt = time[k + 1] - time[k];
         let parts = (dt / step - 1e-6).ceil().max(1.0);
         let h = dt / parts;
@@ -55,9 +102,18 @@ pub fn simulate_arm(model: &Model, laws: &[Option<Law>], joints: &[Joint], log: 
                     }
                     (true, None, Some(w)) => Order::Deliver(w.mean(t - law[Param::Latency], h, &mut hints[j])),
                 };
-                let row = law.row(h, q[j], v[j], order, load[j]);
                 let sigma = law[Param::Scale];
                 let carried: f64 = (0..n).map(|i| mass[(j, i)] * v[i]).sum();
+                if let Some(state) = &wound[j] {
+                    let row = law.row(h, shown(state, &law), state.motor[1], order, load[j]);
+                    load[j] = row.torque;
+                    rows[j] = Some(row);
+                    push[j] = sigma * (carried / h - bias[j]);
+                    factor[j] = sigma * mass[(j, j)] / h;
+                    end[j] = v[j];
+                    continue;
+                }
+                let row = law.row(h, q[j], v[j], order, load[j]);
                 push[j] = row.push + sigma * (carried / h - bias[j]);
                 factor[j] = row.factor + sigma * mass[(j, j)] / h;
                 (bound[j], delivered[j], load[j]) = (row.bound, row.delivered, row.torque);
@@ -77,7 +133,17 @@ pub fn simulate_arm(model: &Model, laws: &[Option<Law>], joints: &[Joint], log: 
                     let law = laws[j].unwrap_or(bare);
                     let others: f64 = (0..n).filter(|&i| i != j).map(|i| mass[(j, i)] * end[i]).sum();
                     let rest = push[j] - law[Param::Scale] * others / h;
-                    let speed = law.settle(factor[j], rest, bound[j], delivered[j]);
+                    let speed = match (&shafts[j], &wound[j], &rows[j]) {
+                        (Some(shaft), Some(state), Some(row)) => {
+                            let mut there = *state;
+                            shaft.step(h, &mut there, row, factor[j], rest, |factor, push| {
+                                law.settle(factor, push, row.bound, row.delivered)
+                            });
+                            next[j] = Some(there);
+                            there.link[1]
+                        }
+                        _ => law.settle(factor[j], rest, bound[j], delivered[j]),
+                    };
                     change = change.max((speed - end[j]).abs());
                     end[j] = speed;
                 }
@@ -86,6 +152,7 @@ pub fn simulate_arm(model: &Model, laws: &[Option<Law>], joints: &[Joint], log: 
                     break;
                 }
             }
+            wound.copy_from_slice(&next);
             for j in 0..n {
                 q[j] = if factor[j].is_nan() { q[j] + h * end[j] } else { Law::move_on(h, q[j], v[j], end[j]) };
                 v[j] = end[j];
@@ -93,10 +160,11 @@ pub fn simulate_arm(model: &Model, laws: &[Option<Law>], joints: &[Joint], log: 
         }
         let sound = q.iter().all(|q| q.is_finite() && q.abs() < 1e6);
         for j in 0..n {
-            path[j].push(if sound { q[j] } else { f64::NAN });
+            let shown = wound[j].as_ref().zip(laws[j]).map_or(q[j], |(state, law)| shown(state, &law));
+            path[j].push(if sound { shown } else { f64::NAN });
         }
         if !sound {
-            path.iter_mut().for_each(|row| row.resize(time.len(), f64::NAN));
+            path.iter_mut().for_each(|row| row.resize(span.len(), f64::NAN));
             break;
         }
     }

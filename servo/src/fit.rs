@@ -98,7 +98,9 @@ pub fn fit(start: &Law, free: &[Param], runs: &[Run], ranges: &Ranges, most: usi
     let mut best = squares(&base);
     let mut damping = 1e-3;
     let mut sensitivity = sensitivities(&law, free, runs, ranges, &base);
-    for _ in 0..most.min(STEPS) {
+    // Where all is given there is nothing to step on.
+    let most = if free.is_empty() { 0 } else { most.min(STEPS) };
+    for _ in 0..most {
         let (normal, gradient) = normal(&sensitivity, &base);
         let mut gained = None;
         // A bound that holds takes its parameter out of the step.

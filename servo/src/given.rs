@@ -138,50 +138,65 @@ impl Constants {
             Signal::Voltage => match (self.torque_constant?, self.resistance?) {
                 (Known::Value(k), Known::Value(r)) => Some(Known::Value(k / r)),
                 (k, r) => {
-                    let ends = |known| match known {
-                        Known::Value(x) => [x, x],
-                        Known::Range(range) => range,
-                    };
-                    let (k, r) = (ends(k), ends(r));
+                    let (k, r) = (k.ends(), r.ends());
                     Some(Known::Range([k[0] / r[1], k[1] / r[0]]))
                 }
             },
         }
     }
 
-    /// Puts what is known into a joint: bounds, and where a fit begins.
+    /// The number that its gain goes by in a log: the servo's own, or its stiffness. Only its ratio between logs counts.
+    pub fn level(&self) -> Option<f64> {
+        let stiffness = match self.stiffness {
+            Some(Known::Value(stiffness)) => Some(stiffness),
+            _ => None,
+        };
+        self.gain.or(stiffness)
+    }
+
+    /// Puts what is known into a joint: numbers that stand, bounds, and where a fit begins. Torques need the scale of the
+    /// drive, a number or a range; without it they say nothing of what it follows.
     pub fn apply(&self, joint: &mut Joint) {
         let scale = self.torque(joint.signal);
-        match scale {
-            Some(Known::Value(s)) => joint.fix(Param::Scale, 1.0 / s),
-            Some(Known::Range([a, b])) => joint.bound(Param::Scale, 1.0 / b, 1.0 / a),
-            None => {}
+        // σ = 1/s.
+        let sigma = scale.map(|scale| {
+            let [a, b] = scale.ends();
+            [1.0 / b, 1.0 / a]
+        });
+        if let Some(ends) = sigma {
+            joint.put(Param::Scale, ends);
         }
-        if let Some(Known::Value(latency)) = self.latency {
-            joint.fix(Param::Latency, latency);
-        } else if let Some(Known::Range([a, b])) = self.latency {
-            joint.bound(Param::Latency, a, b);
+        let volts = self.voltage_limit.filter(|_| joint.signal == Signal::Voltage);
+        let plain = [
+            (Param::Latency, self.latency),
+            (Param::Speed, self.speed_limit),
+            (Param::DeadBand, self.dead_band),
+            (Param::Limit, volts),
+        ];
+        for (param, known) in plain.into_iter().filter_map(|(param, known)| Some((param, known?))) {
+            joint.put(param, known.ends());
         }
-        if let Some(Known::Value(limit)) = self.voltage_limit
-            && joint.signal == Signal::Voltage
-        {
-            joint.fix(Param::Limit, limit);
-        }
-        if let Some(Known::Value(speed)) = self.speed_limit {
-            joint.fix(Param::Speed, speed);
-        }
-        if let Some(Known::Value(width)) = self.dead_band {
-            joint.fix(Param::DeadBand, width);
-        }
-        if let Some(Known::Value(s)) = scale {
-            if let Some(Known::Value(damping)) = self.damping {
-                joint.fix(Param::Damping, damping / s);
-                joint.ranges.absolute[Param::Damping as usize] = damping;
+        let Some([least, greatest]) = sigma else { return };
+        for (param, known) in [(Param::Damping, self.damping), (Param::Limit, self.torque_limit)] {
+            let Some(known) = known else { continue };
+            let [a, b] = known.ends();
+            joint.put(param, [a * least, b * greatest]);
+            // A torque that stands moves with the scale, where that is free.
+            if a == b {
+                joint.ranges.absolute[param as usize] = a;
+                joint.given[param as usize] = true;
+                joint.start[param] = 0.5 * a * (least + greatest);
             }
-            if let Some(Known::Value(limit)) = self.torque_limit {
-                joint.fix(Param::Limit, limit / s);
-                joint.ranges.absolute[Param::Limit as usize] = limit;
-            }
+        }
+    }
+}
+
+impl Known {
+    /// Least and greatest.
+    fn ends(self) -> [f64; 2] {
+        match self {
+            Known::Value(x) => [x, x],
+            Known::Range(ends) => ends,
         }
     }
 }
@@ -227,14 +242,20 @@ fn matches(pattern: &str, name: &str) -> bool {
 }
 
 impl Joint {
-    fn fix(&mut self, param: Param, value: f64) {
-        self.start[param] = value;
-        self.given[param as usize] = true;
-    }
-
-    fn bound(&mut self, param: Param, least: f64, greatest: f64) {
+    /// A number that stands, or a range within which a fit may look.
+    fn put(&mut self, param: Param, [least, greatest]: [f64; 2]) {
+        if least == greatest {
+            self.start[param] = least;
+            self.given[param as usize] = true;
+            return;
+        }
         self.ranges.bounds[param as usize] = [least, greatest];
-        self.start[param] = (least * greatest).max(0.0).sqrt();
+        self.ranges.scale[param as usize] = 0.5 * (least + greatest);
+        self.bounded[param as usize] = true;
+        let is_limit = matches!(param, Param::Limit | Param::Speed);
+        if !is_limit {
+            self.start[param] = 0.5 * (least + greatest);
+        }
     }
 }
 
@@ -270,6 +291,33 @@ mod tests {
             assert!(error.contains(word), "{text}: {error}");
         }
         assert!(Given::from_toml("latency = 0", &joints()).is_ok());
+    }
+
+    #[test]
+    fn a_range_bounds_a_fit_and_a_number_stands() {
+        let mut joint = crate::prepare::Joint::blank(Signal::Command);
+        let text =
+            "stiffness = [5, 20]\ndamping = [0.1, 0.4]\nlatency = [0, 0.02]\ntorque_limit = 2\ndead_band = 0.004\n";
+        Given::from_toml(text, &joints()).unwrap().of("a", None).apply(&mut joint);
+        let bounds = |param: Param| joint.ranges.bounds[param as usize];
+        assert_eq!((bounds(Param::Scale), joint.given[Param::Scale as usize]), ([0.05, 0.2], false));
+        // In units of what the drive follows: least and greatest over all scales.
+        assert_eq!((bounds(Param::Damping), bounds(Param::Latency)), ([0.1 * 0.05, 0.4 * 0.2], [0.0, 0.02]));
+        assert_eq!(
+            (bounds(Param::Limit), joint.ranges.absolute[Param::Limit as usize]),
+            ([2.0 * 0.05, 2.0 * 0.2], 2.0)
+        );
+        assert!(joint.given[Param::DeadBand as usize] && joint.start[Param::DeadBand] == 0.004);
+    }
+
+    #[test]
+    fn a_stiffness_of_a_log_is_its_gain() {
+        let text = "stiffness = 10\n[log.\"soft*\"]\nstiffness = 5\n";
+        let given = Given::from_toml(text, &joints()).unwrap();
+        assert_eq!(
+            (given.of("a", Some("soft.csv")).level(), given.of("a", Some("b.csv")).level()),
+            (Some(5.0), Some(10.0))
+        );
     }
 
     #[test]

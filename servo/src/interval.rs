@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 /// Blocks into which all errors of a joint are cut.
 const BLOCKS: usize = 24;
 /// Student's t at 97.5 % with as many blocks less one.
-const T975: f64 = 2.07;
+pub const T975: f64 = 2.07;
 /// A scale known to a third or worse is not known: ratios are given instead of torques.
 const KNOWN: f64 = 0.33;
 

@@ -1,6 +1,7 @@
 //! The effects that a servo joint can have, each with what frees it in the law and what it costs to claim it.
 
-use crate::law::Param;
+use crate::law::{Law, PARAMS, Param};
+use crate::wind_up::CONTACT;
 
 /// A kind of effect, by its public name in the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -11,6 +12,8 @@ pub enum Kind {
     Stribeck,
     /// Dry friction in proportion to the load.
     Load,
+    /// Friction under load that rises towards rest; stands on [`Kind::Load`], and is told as a part of it.
+    LoadRise,
     /// Viscous friction; told from the drive's damping only where that is given or the motor is off for a while.
     Viscous,
     /// Rotor inertia.
@@ -31,14 +34,19 @@ pub enum Kind {
     SpeedLimit,
     /// The servo does nothing within an error of this size.
     DeadBand,
+    /// A spring between motor and link.
+    Elasticity,
+    /// Play between motor and link.
+    Backlash,
 }
 
 impl Kind {
     /// All, in the order in which they are tried.
-    pub const ALL: [Kind; 13] = [
+    pub const ALL: [Kind; 16] = [
         Kind::Coulomb,
         Kind::Load,
         Kind::Stribeck,
+        Kind::LoadRise,
         Kind::Viscous,
         Kind::Armature,
         Kind::Bias,
@@ -49,6 +57,8 @@ impl Kind {
         Kind::DampingError,
         Kind::SpeedLimit,
         Kind::DeadBand,
+        Kind::Elasticity,
+        Kind::Backlash,
     ];
 
     /// Public name.
@@ -57,6 +67,7 @@ impl Kind {
             Kind::Coulomb => "coulomb_friction",
             Kind::Stribeck => "stribeck_friction",
             Kind::Load => "load_dependent_friction",
+            Kind::LoadRise => "load_dependent_friction_rise",
             Kind::Viscous => "viscous_friction",
             Kind::Armature => "armature",
             Kind::Bias => "torque_bias",
@@ -67,6 +78,8 @@ impl Kind {
             Kind::DampingError => "servo_damping_error",
             Kind::SpeedLimit => "speed_limit",
             Kind::DeadBand => "dead_band",
+            Kind::Elasticity => "joint_elasticity",
+            Kind::Backlash => "backlash",
         }
     }
 
@@ -78,6 +91,9 @@ impl Kind {
                 &[(Param::Rise, "static", "N m"), (Param::StribeckVelocity, "stribeck_velocity", "rad/s")]
             }
             Kind::Load => &[(Param::Load, "load_coefficient", "-")],
+            Kind::LoadRise => {
+                &[(Param::LoadRise, "load_rise", "-"), (Param::StribeckVelocity, "stribeck_velocity", "rad/s")]
+            }
             Kind::Viscous => &[(Param::Viscous, "viscous", "N m s/rad")],
             Kind::Armature => &[(Param::Armature, "armature", "kg m²")],
             Kind::Bias => &[(Param::Bias, "bias", "N m")],
@@ -88,6 +104,8 @@ impl Kind {
             Kind::DampingError => &[(Param::Damping, "damping", "N m s/rad")],
             Kind::SpeedLimit => &[(Param::Speed, "limit", "rad/s")],
             Kind::DeadBand => &[(Param::DeadBand, "width", "rad")],
+            Kind::Elasticity => &[(Param::Spring, "stiffness", "N m/rad"), (Param::Armature, "rotor", "kg m²")],
+            Kind::Backlash => &[(Param::Gap, "gap", "rad"), (Param::Armature, "rotor", "kg m²")],
         }
     }
 
@@ -108,12 +126,82 @@ impl Kind {
     /// Where a fit of it may begin, in units of each parameter's scale; the best of them is taken.
     pub fn starts(self) -> &'static [f64] {
         match self {
-            Kind::Coulomb | Kind::Stribeck | Kind::Load => &[0.3, 1.0],
+            Kind::Coulomb | Kind::Stribeck | Kind::Load | Kind::LoadRise => &[0.3, 1.0],
             Kind::Saturation | Kind::SpeedLimit => &[0.5, 1.0, 1.6],
             Kind::DeadBand => &[1.0, 3.0],
             Kind::Delay => &[0.5, 2.0],
+            // 3, 5 and 8 Hz.
+            Kind::Elasticity => &[0.5, 0.83, 1.3],
+            Kind::Backlash => &[1.0, 3.0],
             _ => &[0.1],
         }
+    }
+
+    /// Puts it into a law where a fit of it begins, at so many times the scale of each parameter. A given gain or damping stays:
+    /// a fit moves it from there. A given limit or dead band would never be felt where it stands.
+    pub fn begin(self, law: &mut Law, start: f64, scale: &[f64; PARAMS], given: &[bool; PARAMS], inertia: f64) {
+        if self.turns_apart() {
+            // A motor that turns on its own has a rotor; half of what it drives is a start.
+            let rotor = 0.5 * law[Param::Scale] * inertia;
+            law[Param::Armature] = law[Param::Armature].max(rotor);
+            law[Param::Spring] = CONTACT;
+        }
+        let starts = |param: Param| self.is_threshold() || !given[param as usize];
+        for &(param, _, _) in self.parameters().iter().filter(|(param, _, _)| starts(*param)) {
+            if param != Param::Armature || self == Kind::Armature {
+                law[param] = start * scale[param as usize];
+            }
+        }
+    }
+
+    /// Takes it out of a law; `base` is the law without any kind, `others` are those that stay.
+    pub fn clear(self, law: &mut Law, base: &Law, others: &[Kind]) {
+        let stays = |param: Param| others.iter().any(|kind| kind.parameters().iter().any(|(own, _, _)| *own == param));
+        for &(param, _, _) in self.parameters().iter().filter(|(param, _, _)| !stays(*param)) {
+            law[param] = base[param];
+        }
+        match self {
+            Kind::Elasticity | Kind::Backlash => {
+                (law[Param::Spring], law[Param::Gap], law.link_side) = (f64::INFINITY, 0.0, false);
+            }
+            Kind::Coulomb => law[Param::Rise] = 0.0,
+            Kind::Load => law[Param::LoadRise] = 0.0,
+            _ => {}
+        }
+    }
+
+    /// The kind that it stands on, and goes with.
+    pub fn base(self) -> Option<Kind> {
+        match self {
+            Kind::Stribeck => Some(Kind::Coulomb),
+            Kind::LoadRise => Some(Kind::Load),
+            _ => None,
+        }
+    }
+
+    /// Kinds that cannot stand beside it.
+    pub fn excludes(self, other: Kind) -> bool {
+        matches!((self, other), (Kind::Elasticity, Kind::Backlash) | (Kind::Backlash, Kind::Elasticity))
+    }
+
+    /// Whether its first parameter begins to act from the far end on, so that it is told by a whole step and not by a slope.
+    pub fn is_threshold(self) -> bool {
+        matches!(self, Kind::Saturation | Kind::SpeedLimit | Kind::DeadBand | Kind::Elasticity | Kind::Backlash)
+    }
+
+    /// Whether friction stands in for it in a fit that has friction before: both slow a joint down.
+    pub fn hides(self) -> bool {
+        matches!(self, Kind::Saturation | Kind::SpeedLimit)
+    }
+
+    /// Whether motor and link turn apart by it.
+    pub fn turns_apart(self) -> bool {
+        matches!(self, Kind::Elasticity | Kind::Backlash)
+    }
+
+    /// Whether the encoder may be on the link's side of it. The log does not say on which: both are tried.
+    pub fn sides(self) -> &'static [bool] {
+        if self == Kind::Backlash { &[false, true] } else { &[false] }
     }
 
     /// Kinds that logs may take for this one.
@@ -126,6 +214,10 @@ impl Kind {
             Kind::Offset => &[Kind::Bias],
             Kind::Viscous => &[Kind::DampingError],
             Kind::DampingError => &[Kind::Viscous],
+            Kind::Elasticity => &[Kind::Backlash],
+            Kind::Backlash => &[Kind::Elasticity],
+            Kind::Saturation => &[Kind::SpeedLimit],
+            Kind::SpeedLimit => &[Kind::Saturation],
             _ => &[],
         }
     }

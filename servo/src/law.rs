@@ -10,6 +10,8 @@
 //! Source of the friction with load: Duclusaud, Passault, Padois, Ly, "Extended friction models for the physics simulation of
 //! servo actuators", ICRA 2025.
 
+use gapscope_effects::{DeadBand, SpeedLimit};
+
 /// A parameter of a joint's law. `Scale` is 1/s; torques are in units of w.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(usize)]
@@ -46,10 +48,14 @@ pub enum Param {
     DeadBand,
     /// Unit of w per rad of set point error, at the gain of the first log.
     Feedback,
+    /// Frequency at which the link swings behind a motor that stands, rad/s; infinite where they turn as one.
+    Spring,
+    /// Play between motor and link, rad.
+    Gap,
 }
 
 /// How many parameters a law has.
-pub const PARAMS: usize = 16;
+pub const PARAMS: usize = 18;
 
 impl Param {
     /// All, in the order of [`Law::values`].
@@ -70,6 +76,8 @@ impl Param {
         Param::Speed,
         Param::DeadBand,
         Param::Feedback,
+        Param::Spring,
+        Param::Gap,
     ];
 
     /// Whether its unit is that of w over something, so that 1/σ makes a torque of it.
@@ -92,6 +100,8 @@ impl Param {
 pub struct Law {
     /// By [`Param`].
     pub values: [f64; PARAMS],
+    /// Whether the encoder is on the link's side of a spring or of play.
+    pub link_side: bool,
 }
 
 impl Default for Law {
@@ -102,7 +112,8 @@ impl Default for Law {
         values[Param::Limit as usize] = f64::INFINITY;
         values[Param::Speed as usize] = f64::INFINITY;
         values[Param::Feedback as usize] = 1.0;
-        Law { values }
+        values[Param::Spring as usize] = f64::INFINITY;
+        Law { values, link_side: false }
     }
 }
 
@@ -121,7 +132,7 @@ impl std::ops::IndexMut<Param> for Law {
 
 /// Weight of a step's end in the implicit rule: at one half it is of second order and rings where inertia is next to nothing;
 /// this loses a tenth of a step of phase and damps by a third a step.
-const END: f64 = 0.6;
+pub(crate) const END: f64 = 0.6;
 
 /// What a drive is told over a step.
 #[derive(Debug, Clone, Copy)]
@@ -150,7 +161,7 @@ pub struct Row {
 }
 
 /// Part of a step at the end of which the position enters the feedback: half of the way that the step makes.
-fn way(h: f64) -> f64 {
+pub(crate) fn way(h: f64) -> f64 {
     0.5 * h
 }
 
@@ -161,6 +172,12 @@ impl Law {
         let stiffness = self[Param::Feedback].max(1e-9);
         let slow = (self[Param::Damping] + self[Param::Viscous]) / stiffness;
         slow.max(((self[Param::Scale] * inertia + self[Param::Armature]) / stiffness).sqrt())
+    }
+
+    /// Time within which damping alone stops a joint that its drive lets go, s; `inertia` is M.
+    pub fn coasting(&self, inertia: f64) -> f64 {
+        let drag = (self[Param::Damping] + self[Param::Viscous]).max(1e-12);
+        (self[Param::Scale] * inertia + self[Param::Armature]) / drag
     }
 
     /// Position at the end of a step, rad.
@@ -179,7 +196,7 @@ impl Law {
             Order::Deliver(w) => (0.0, w),
             Order::Follow(target, gain) => {
                 let error = target - q;
-                if error.abs() < p[Param::DeadBand as usize] { (0.0, 0.0) } else { (gain, gain * error) }
+                if DeadBand::acts(p[Param::DeadBand as usize], error) { (gain, gain * error) } else { (0.0, 0.0) }
             }
         };
         let limit = p[Param::Limit as usize];
@@ -214,12 +231,7 @@ impl Law {
             return 0.0;
         }
         let end = (push - bound.copysign(push)) / factor;
-        let most = self.values[Param::Speed as usize];
-        // The drive does not push beyond its speed; a load may.
-        if end.abs() > most && delivered * end > 0.0 {
-            let without = (push - delivered - bound.copysign(push)) / factor;
-            return end.signum() * most.max(end.signum() * without);
-        }
-        end
+        let without = || (push - delivered - bound.copysign(push)) / factor;
+        SpeedLimit::speed(end, delivered, self.values[Param::Speed as usize], without)
     }
 }

@@ -3,10 +3,11 @@
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
 use crate::run::Signal;
+use crate::wind_up::{CONTACT, spring_of};
 use gapscope_dynamics::Model;
 use gapscope_effects::{
-    Armature, CoulombFriction, Effect, JointZeroOffset, LoadDependentFriction, StribeckFriction, TorqueBias,
-    ViscousFriction,
+    Armature, Backlash, CoulombFriction, Effect, EffectError, JointElasticity, JointZeroOffset, LoadDependentFriction,
+    Plant, StribeckFriction, TorqueBias, ViscousFriction,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -37,6 +38,22 @@ pub struct DriveModel {
     pub speed_limit: Option<f64>,
     /// rad.
     pub dead_band: f64,
+    /// Friction under load that rises towards rest, beside `load_dependent_friction`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load_rise: Option<LoadRise>,
+    /// Whether the encoder is on the link's side of a spring or of play; else it is on the motor's.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub link_side: bool,
+}
+
+/// What the load coefficient is greater by at rest, and the speed at which that fades: μ + rise · e^{−(q̇/v)²}.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadRise {
+    /// –.
+    pub rise: f64,
+    /// v, rad/s.
+    pub stribeck_velocity: f64,
 }
 
 /// The corrected arm.
@@ -63,6 +80,9 @@ pub enum ServoModelError {
         "not a corrected servo arm ({0}); expected the corrected.json that `gapscope diagnose` writes for logs without torque"
     )]
     Unreadable(#[from] serde_json::Error),
+    /// An effect that the robot cannot have.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
     /// Another schema.
     #[error("schema is `{0}`, expected `{MODEL_SCHEMA}`; write the file anew with this version's `gapscope diagnose`")]
     Schema(String),
@@ -97,9 +117,9 @@ pub enum ServoModelError {
 }
 
 impl ServoModel {
-    /// The model of laws that were found.
-    pub fn new(model: &Model, joints: &[Joint], laws: &[Law], weights: &[f64]) -> ServoModel {
-        let mut effects = Vec::new();
+    /// The model of laws that were found; `bodies` are effects on bodies and gravity.
+    pub fn new(model: &Model, joints: &[Joint], laws: &[Law], weights: &[f64], bodies: &[Effect]) -> ServoModel {
+        let mut effects = bodies.to_vec();
         let each = |of: &dyn Fn(&Law) -> f64| -> BTreeMap<String, f64> {
             let values = joints.iter().zip(laws).map(|(joint, law)| (joint.name.clone(), of(law)));
             values.filter(|(_, value)| *value != 0.0).collect()
@@ -119,6 +139,14 @@ impl ServoModel {
         let bias = each(&|law| torque(law, Param::Bias));
         let offset = each(&|law| law[Param::Offset]);
         let load_coefficient = each(&|law| law[Param::Load]);
+        let gap = each(&|law| law[Param::Gap]);
+        let mut spring = JointElasticity::default();
+        let bends = |law: &Law| law.winds_up() && law[Param::Gap] == 0.0;
+        for (joint, law) in joints.iter().zip(laws).filter(|(_, law)| bends(law)) {
+            let (stiffness, damping) = spring_of(law, joint.sizes.inertia);
+            spring.stiffness.insert(joint.name.clone(), stiffness);
+            spring.damping.insert(joint.name.clone(), damping);
+        }
         for (empty, effect) in [
             (coulomb.is_empty(), Effect::CoulombFriction(CoulombFriction { coulomb })),
             (stribeck.coulomb.is_empty(), Effect::StribeckFriction(stribeck)),
@@ -127,6 +155,8 @@ impl ServoModel {
             (armature.is_empty(), Effect::Armature(Armature { armature })),
             (bias.is_empty(), Effect::TorqueBias(TorqueBias { bias })),
             (offset.is_empty(), Effect::JointZeroOffset(JointZeroOffset { offset })),
+            (spring.stiffness.is_empty(), Effect::JointElasticity(spring)),
+            (gap.is_empty(), Effect::Backlash(Backlash { gap })),
         ] {
             if !empty {
                 effects.push(effect);
@@ -144,6 +174,9 @@ impl ServoModel {
                 limit: finite(law[Param::Limit]),
                 speed_limit: finite(law[Param::Speed]),
                 dead_band: law[Param::DeadBand],
+                load_rise: (law[Param::LoadRise] > 0.0)
+                    .then(|| LoadRise { rise: law[Param::LoadRise], stribeck_velocity: law[Param::StribeckVelocity] }),
+                link_side: law.link_side,
             };
             (joint.name.clone(), drive)
         });
@@ -182,13 +215,24 @@ impl ServoModel {
             let limits = [drive.limit, drive.speed_limit, drive.gain];
             let sound = above(drive.torque_per_unit)
                 && above(drive.feedback)
-                && [drive.damping, drive.latency, drive.dead_band].into_iter().all(least)
+                && [drive.damping, drive.dead_band].into_iter().all(least)
+                && drive.latency.is_finite()
                 && limits.into_iter().flatten().all(above);
             if !sound {
                 return Err(ServoModelError::Value { joint: joint.clone() });
             }
         }
         Ok(read)
+    }
+
+    /// The robot with the effects on its bodies and its gravity.
+    ///
+    /// # Errors
+    /// A body that cannot be, or a joint that the robot does not have.
+    pub fn bodies(&self, model: &Model) -> Result<Model, ServoModelError> {
+        let is_body = |effect: &&Effect| matches!(effect, Effect::Payload(_) | Effect::GravityMisalignment(_));
+        let effects: Vec<Effect> = self.effects.iter().filter(is_body).cloned().collect();
+        Ok(Plant::new(model, &effects, 1e-3)?.model().clone())
     }
 
     /// The law of each joint; gains of the logs' runs are put in the ratio to the gain that the model was found at.
@@ -229,6 +273,10 @@ impl ServoModel {
         law[Param::Limit] = drive.limit.unwrap_or(f64::INFINITY);
         law[Param::Speed] = drive.speed_limit.unwrap_or(f64::INFINITY);
         law[Param::DeadBand] = drive.dead_band;
+        if let Some(under_load) = drive.load_rise {
+            law[Param::LoadRise] = under_load.rise.max(0.0);
+            law[Param::StribeckVelocity] = under_load.stribeck_velocity.max(1e-6);
+        }
         let at = |map: &BTreeMap<String, f64>| map.get(&joint.name).copied().unwrap_or(0.0);
         for effect in &self.effects {
             match effect {
@@ -243,6 +291,14 @@ impl ServoModel {
                 Effect::Armature(e) => law[Param::Armature] = at(&e.armature) / s,
                 Effect::TorqueBias(e) => law[Param::Bias] = at(&e.bias) / s,
                 Effect::JointZeroOffset(e) => law[Param::Offset] = at(&e.offset),
+                Effect::JointElasticity(e) if e.stiffness.contains_key(&joint.name) => {
+                    law[Param::Spring] = (at(&e.stiffness) / joint.sizes.inertia.max(1e-12)).sqrt();
+                    law.link_side = drive.link_side;
+                }
+                Effect::Backlash(e) if e.gap.contains_key(&joint.name) => {
+                    (law[Param::Gap], law[Param::Spring]) = (at(&e.gap), CONTACT);
+                    law.link_side = drive.link_side;
+                }
                 _ => {}
             }
         }

@@ -116,8 +116,12 @@ pub struct Run {
     pub seen_feedback: Option<f64>,
     /// What the rest of the arm does.
     pub around: Surroundings,
+    /// Mean inertia of the bodies about the joint, kg m²: what a spring's frequency is told by.
+    pub mass: f64,
     /// Weight of each sample's error; zero where it is not compared.
     pub weight: Vec<f64>,
+    /// Which samples repeat the one before while the arm moves: they are not compared.
+    pub stale: Vec<bool>,
     /// Samples at which the simulation starts anew from the log, in order: where no closed loop holds it to the log.
     pub restarts: Vec<usize>,
     /// Longest step of the integrator, s.

@@ -30,6 +30,36 @@ impl Estimate {
     }
 }
 
+/// A parameter: one for each joint, or of the whole arm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Parameter {
+    /// One number of the whole arm.
+    Single(Estimate),
+    /// A vector of the whole arm.
+    Vector(Vector),
+    /// One number for each joint.
+    PerJoint(BTreeMap<String, Estimate>),
+}
+
+/// A vector with its 95 % interval, component by component.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Vector {
+    /// Estimate.
+    pub value: Vec<f64>,
+    /// Least and greatest.
+    pub ci95: [Vec<f64>; 2],
+    /// Unit.
+    pub unit: String,
+}
+
+impl Parameter {
+    /// The number of a joint; `None` for a joint that has none, and for what the whole arm has.
+    pub fn at(&self, joint: &str) -> Option<&Estimate> {
+        if let Parameter::PerJoint(joints) = self { joints.get(joint) } else { None }
+    }
+}
+
 /// A gap before and after.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Change {
@@ -109,8 +139,8 @@ pub struct FoundEffect {
     pub part: String,
     /// Probability.
     pub confidence: f64,
-    /// Parameters by public name and joint.
-    pub parameters: BTreeMap<String, BTreeMap<String, Estimate>>,
+    /// Parameters by public name.
+    pub parameters: BTreeMap<String, Parameter>,
     /// What the logs cannot tell from it.
     pub indistinguishable_from: Vec<String>,
     /// What the gap loses by it.

@@ -2,6 +2,7 @@
 
 use crate::law::{Law, Order, Param};
 use crate::run::{Held, Run};
+use crate::wind_up::{Shaft, Wound};
 
 /// Step of the integrator, s: this part of the servo's own time constant, within these bounds.
 pub const STEP_PART: f64 = 0.08;
@@ -12,6 +13,9 @@ pub const STEPS: [f64; 2] = [1e-3, 1e-2];
 pub fn simulate(law: &Law, run: &Run, out: &mut Vec<f64>) {
     out.clear();
     let count = run.time.len();
+    if let Some(shaft) = law.shaft(run.mass) {
+        return simulate_wound(law, &shaft, run, out);
+    }
     let (mut q, mut v, mut load) = (run.position[0], 0.0, 0.0);
     let (mut hint, mut restart) = (0, 0);
     let sigma = law[Param::Scale];
@@ -54,6 +58,45 @@ pub fn simulate(law: &Law, run: &Run, out: &mut Vec<f64>) {
             v = end;
         }
         out.push(q);
+    }
+}
+
+/// The same of a joint whose motor and link turn apart: the side that the encoder is on.
+fn simulate_wound(law: &Law, shaft: &Shaft, run: &Run, out: &mut Vec<f64>) {
+    let around = &run.around;
+    let sigma = law[Param::Scale];
+    let (gain, latency) = (law[Param::Feedback] * run.gain, law[Param::Latency]);
+    let shown = |state: &Wound| if law.link_side { state.link[0] } else { state.motor[0] };
+    let mut state = shaft.at_rest(run.position[0], sigma * around.gravity[0], law.link_side);
+    let (mut hint, mut restart, mut load) = (0, 0, 0.0);
+    out.push(shown(&state));
+    for k in 0..run.time.len() - 1 {
+        if run.restarts.get(restart) == Some(&k) {
+            restart += 1;
+            let (q, v) = run.state(k);
+            state = shaft.at_rest(q, sigma * around.gravity[k], law.link_side);
+            (state.motor[1], state.link[1]) = (v, v);
+        }
+        let dt = run.time[k + 1] - run.time[k];
+        let parts = (dt / run.step - 1e-6).ceil().max(1.0);
+        let h = dt / parts;
+        for part in 0..parts as usize {
+            let along = (part as f64 + 0.5) / parts;
+            let between = |row: &[f64]| row[k] + along * (row[k + 1] - row[k]);
+            let middle = state.link[0] + 0.5 * h * state.link[1] - law[Param::Offset];
+            let (sin, cos) = (middle - between(&run.position)).sin_cos();
+            let weight = between(&around.gravity) * cos + between(&around.slope) * sin + between(&around.coupling);
+            let inertia = sigma * between(&around.inertia) / h;
+            let order = order(run, k, run.time[k] + part as f64 * h, h, latency, gain, &mut hint);
+            // The servo closes its loop over what its encoder shows; the rotor has its own speed.
+            let row = law.row(h, shown(&state), state.motor[1], order, load);
+            let push = inertia * state.link[1] - sigma * weight;
+            shaft.step(h, &mut state, &row, inertia, push, |factor, push| {
+                law.settle(factor, push, row.bound, row.delivered)
+            });
+            load = row.torque;
+        }
+        out.push(shown(&state));
     }
 }
 

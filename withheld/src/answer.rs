@@ -93,6 +93,12 @@ impl Named {
 }
 
 impl Named {
+    /// Unit of a parameter at a joint; `None` where it is not given.
+    pub fn unit(&self, name: &str, joint: &str) -> Option<&str> {
+        let found = self.parameters.get(name)?;
+        found.get(joint).unwrap_or(found).get("unit")?.as_str()
+    }
+
     /// 95 % intervals of a parameter at a joint, or of a robot-wide one: one for a number, one for each component of a vector;
     /// none where they are not given.
     pub fn intervals(&self, name: &str, joint: &str) -> Vec<[f64; 2]> {
@@ -108,7 +114,8 @@ impl Named {
     }
 }
 
-/// The weighted torque shrink of a diagnosis or of an evaluation; `None` where it is null or missing.
-pub(crate) fn torque_shrink(shrink: &Value) -> Option<f64> {
-    shrink.get("torque")?.get("shrink")?.as_f64()
+/// The weighted shrink of the gap in torque, in position where torque is not known, of a diagnosis or of an evaluation;
+/// `None` where it is null or missing.
+pub(crate) fn gap_shrink(shrink: &Value) -> Option<f64> {
+    shrink.get("torque").or_else(|| shrink.get("position"))?.get("shrink")?.as_f64()
 }

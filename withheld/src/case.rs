@@ -4,6 +4,7 @@ use crate::draw::{Difficulty, Drawn, Sort, draw};
 use crate::fault::{FAULTS, any_fault, spoil};
 use crate::outside::Disturbed;
 use crate::robot::Robot;
+use crate::servo::make_servo_case;
 use crate::sight::{see, shows};
 use crate::truth::{Truth, Used, is_unknown};
 use crate::used::{arm, recipe};
@@ -43,6 +44,8 @@ pub struct CaseSpec {
     pub used: Option<Used>,
     /// Whether its logs may be wrong.
     pub faulty: bool,
+    /// Whether it is a servo arm, drawn itself, whose logs hold no torque.
+    pub servo: bool,
     /// Its seed.
     pub seed: u64,
     /// How large the effects are.
@@ -66,6 +69,8 @@ pub struct Case {
     pub tests: Vec<Episode>,
     /// What is sealed.
     pub truth: Truth,
+    /// What of a servo arm's drives is known, `servo.toml`.
+    pub servo: Option<String>,
 }
 
 /// Why there is no case.
@@ -85,11 +90,14 @@ pub enum CaseError {
     },
 }
 
-/// Makes a case. The same robot and spec give the same case, to the bit.
+/// Makes a case. The same robot and spec give the same case, to the bit. A servo arm is drawn, whatever the robot.
 ///
 /// # Errors
 /// A robot that does not follow any reference with the effects, however they are drawn.
 pub fn make_case(robot: &Robot, spec: &CaseSpec) -> Result<Case, CaseError> {
+    if spec.servo {
+        return make_servo_case(spec);
+    }
     let mut random = Pcg64::seed_from_u64(spec.seed);
     let level = NOISE[random.random_range(0..NOISE.len())];
     let mut last = String::new();
@@ -199,6 +207,7 @@ fn attempt(
         effects: drawn.into_iter().map(|drawn| drawn.sealed).collect(),
         faulty: spec.faulty,
         fault,
+        servo: None,
     };
     let tests = logs.split_off(spec.episodes);
     while let Some(fault) = &mut truth.fault
@@ -206,7 +215,7 @@ fn attempt(
     {
         truth.fault = any_fault(&FAULTS[..FAULTS.len() - 1], &robot.model, spec.episodes, &mut chance);
     }
-    Ok(Ok(Case { urdf: robot.urdf.clone(), episodes: logs, tests, truth }))
+    Ok(Ok(Case { urdf: robot.urdf.clone(), episodes: logs, tests, truth, servo: None }))
 }
 
 /// A log of the robot with what was drawn.
@@ -277,6 +286,7 @@ mod tests {
             sorts,
             used: None,
             faulty: false,
+            servo: false,
             seed,
             difficulty: Difficulty::Mixed,
             seconds: 3.0,

@@ -127,6 +127,7 @@ mod tests {
             error: None,
             arm: None,
             fault: None,
+            servo: None,
         }
     }
 

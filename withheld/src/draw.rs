@@ -296,10 +296,18 @@ pub(crate) fn draw(
             let parameters = json!({ "ratio": ratio, "coulomb": coulomb, "viscous": viscous });
             (vec![a, b], parameters, vec![Effect::JointCoupling(effect)])
         }
-        // Kinds outside the catalogue have no effect; the plan draws none.
-        Sort::Known(Kind::LinkDrag | Kind::JointDrag | Kind::Swing | Kind::Rub | Kind::Catch) => {
-            (vec![], json!({}), vec![])
-        }
+        // Kinds outside the catalogue and those of servos have no effect on efforts; the plan draws none.
+        Sort::Known(
+            Kind::LinkDrag
+            | Kind::JointDrag
+            | Kind::Swing
+            | Kind::Rub
+            | Kind::Catch
+            | Kind::ServoGainError
+            | Kind::ServoDampingError
+            | Kind::SpeedLimit
+            | Kind::DeadBand,
+        ) => (vec![], json!({}), vec![]),
         Sort::Unknown(which) => {
             let (joints, parameters, law) = unknown(which, robot, joint, size(random), random);
             outside = Some(law);

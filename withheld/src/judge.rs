@@ -1,6 +1,6 @@
 //! An answer held against the sealed truth.
 
-use crate::answer::{Answer, Named, torque_shrink};
+use crate::answer::{Answer, Named, gap_shrink};
 use crate::truth::{DETECTABLE, SealedEffect, Truth, is_unknown};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -20,17 +20,18 @@ pub(crate) const ROBOT_WIDE: [&str; 5] =
     ["payload", "gravity_misalignment", "actuation_delay", "actuator_lag", "external_contact"];
 
 /// Parameters with one value per affected joint: name in the truth, public name.
-const PER_JOINT: [(&str, &str); 6] = [
+const PER_JOINT: [(&str, &str); 7] = [
     ("b", "viscous"),
     ("fc", "coulomb"),
     ("ia", "armature"),
     ("bias", "bias"),
     ("amp", "amplitude"),
     ("sigma0", "bristle_stiffness"),
+    ("damping", "damping"),
 ];
 
 /// Parameters with one value in the truth: name there, public name.
-const SCALAR: [(&str, &str); 17] = [
+const SCALAR: [(&str, &str); 18] = [
     ("mass", "mass"),
     ("delay_s", "delay"),
     ("tau_s", "time_constant"),
@@ -48,10 +49,11 @@ const SCALAR: [(&str, &str); 17] = [
     ("ratio", "ratio"),
     ("coulomb", "coulomb"),
     ("viscous", "viscous"),
+    ("width", "width"),
 ];
 
 /// How many of the kinds that the log cannot tell from an effect count as named with it.
-const TIES: usize = 2;
+pub(crate) const TIES: usize = 2;
 
 /// How an answer did.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -74,9 +76,9 @@ pub struct Judgement {
     pub conf: Vec<(f64, bool)>,
     /// Each number of the truth of the kinds rightly named.
     pub params: Vec<ParameterError>,
-    /// Shrink of the torque gap that the answer predicts.
+    /// Shrink of the gap, of torque or of position, that the answer predicts.
     pub predicted_shrink: Option<f64>,
-    /// Shrink of the torque gap on the sealed test episodes.
+    /// Shrink of the gap on the sealed test episodes.
     pub shrink: Option<f64>,
     /// Distance between both; 1 where effects are named but a figure is missing.
     pub shrink_err: Option<f64>,
@@ -110,7 +112,7 @@ pub fn judge(truth: &Truth, answer: Option<&Answer>, evaluation: Option<&Value>)
         verdict: answer.verdict.clone(),
         got: answer.effects.iter().map(|e| e.kind.clone()).collect(),
         conf: answer.effects.iter().map(|e| (e.confidence, allowed.contains(e.kind.as_str()))).collect(),
-        predicted_shrink: torque_shrink(&answer.shrink),
+        predicted_shrink: gap_shrink(&answer.shrink),
         ..Judgement::default()
     };
     let verdict = answer.verdict.as_deref().unwrap_or_default();
@@ -130,7 +132,7 @@ pub fn judge(truth: &Truth, answer: Option<&Answer>, evaluation: Option<&Value>)
         judgement.params = parameter_errors(truth, answer);
     }
     if !kinds.is_empty() && !kinds.contains("external_contact") {
-        judgement.shrink = evaluation.and_then(|e| torque_shrink(e.get("shrink")?));
+        judgement.shrink = evaluation.and_then(|e| gap_shrink(e.get("shrink")?));
         judgement.shrink_err = match (judgement.predicted_shrink, judgement.shrink) {
             (Some(predicted), Some(actual)) => Some((predicted - actual).abs()),
             _ if answer.effects.is_empty() => None,
@@ -183,6 +185,10 @@ fn parameter_errors(truth: &Truth, answer: &Answer) -> Vec<ParameterError> {
     for effect in &truth.effects {
         let Some(named) = answer.effects.iter().find(|e| e.kind == effect.kind) else { continue };
         for (name, joint, value) in numbers(effect) {
+            // A ratio to the stiffness of a servo, where nothing tells its scale.
+            let is_ratio = named.unit(name, joint).is_some_and(|unit| unit.contains("/("));
+            let stiffness = truth.servo.as_ref().and_then(|servo| servo.stiffness.get(joint));
+            let value = stiffness.filter(|_| is_ratio).map_or(value, |stiffness| value / stiffness);
             let (found, interval) = named.parameter(name, joint);
             let scale = if name == "gain" { 1.0 } else { value.abs().max(1e-9) };
             errors.push(ParameterError {

@@ -2,6 +2,7 @@
 
 use crate::case::CaseSpec;
 use crate::draw::{Difficulty, Sort, UNKNOWN};
+use crate::servo::{AGAINST, CLASH as SERVO_CLASH, FREE};
 use crate::truth::Used;
 use gapscope_effects::Kind;
 use rand::seq::{IndexedRandom, SliceRandom};
@@ -54,7 +55,13 @@ pub struct Plan {
     /// Whether the logs of two cases in three have a fault, drawn at random.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub faulty: bool,
+    /// Servo arms, drawn themselves: then `cases` and `multi` have one effect of a servo arm, and two to four.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub servo: bool,
 }
+
+/// Parts of a bank of servo arms with one effect, with several, and with one outside the catalogue.
+const SERVO: [f64; 3] = [0.35, 0.35, 0.15];
 
 /// Parts of a bank of used arms that have a further effect of the catalogue, and one outside it.
 const FURTHER: [f64; 2] = [0.7, 0.15];
@@ -65,6 +72,20 @@ impl Plan {
         let [known, unknown] = FURTHER.map(|part| (part * arms as f64).round() as usize);
         (self.cases, self.unknown) = (known, unknown.min(arms - known));
         self.none = arms - self.cases - self.unknown;
+    }
+
+    /// Shares out a bank of servo arms: a third has one effect, a third several, as many an unknown one as none.
+    pub fn share_out_servos(&mut self, arms: usize) {
+        let [single, several, unknown] = SERVO.map(|part| (part * arms as f64).round() as usize);
+        self.cases = single.min(arms);
+        self.multi = several.min(arms - self.cases);
+        self.unknown = unknown.min(arms - self.cases - self.multi);
+        self.none = arms - self.cases - self.multi - self.unknown;
+    }
+
+    /// Servo arms enough for each kind to be the one effect of one.
+    pub fn servo_arms() -> usize {
+        ((FREE.len() + AGAINST.len()) as f64 / SERVO[0]).round() as usize
     }
 
     /// Used arms enough for each kind to be the further effect of one.
@@ -80,14 +101,14 @@ impl Plan {
     /// The cases, in an order that says nothing about what they hold.
     pub fn specs(&self) -> Vec<CaseSpec> {
         let mut random = Pcg64::seed_from_u64(self.seed);
-        let mut kinds: Vec<Sort> = further(self.used).into_iter().map(Sort::Known).collect();
+        let mut kinds: Vec<Sort> = self.kinds().into_iter().map(Sort::Known).collect();
         let mut laws: Vec<Sort> = (0..UNKNOWN.len()).map(Sort::Unknown).collect();
         kinds.shuffle(&mut random);
         laws.shuffle(&mut random);
         let turns = |sorts: Vec<Sort>, count: usize| sorts.into_iter().cycle().take(count).map(|sort| vec![sort]);
         let mut plan: Vec<Vec<Sort>> = turns(kinds, self.cases).chain(turns(laws.clone(), self.unknown)).collect();
         plan.extend((0..self.none).map(|_| Vec::new()));
-        plan.extend((0..self.multi).map(|_| several(&mut random)));
+        plan.extend((0..self.multi).map(|_| self.several(&mut random)));
         for law in laws.iter().cycle().take(self.mixed) {
             plan.push(vec![known(&mut random), *law]);
         }
@@ -96,6 +117,7 @@ impl Plan {
             sorts,
             used: self.used,
             faulty: self.faulty,
+            servo: self.servo,
             seed: self.seed.wrapping_mul(1000).wrapping_add(i as u64),
             difficulty: self.difficulty,
             seconds: self.seconds,
@@ -103,6 +125,19 @@ impl Plan {
             tests: self.tests,
         };
         plan.into_iter().enumerate().map(spec).collect()
+    }
+}
+
+impl Plan {
+    /// Kinds of which each is the one effect of a case in turn.
+    fn kinds(&self) -> Vec<Kind> {
+        if self.servo { [&FREE[..], &AGAINST].concat() } else { further(self.used) }
+    }
+
+    /// Two to four kinds that do not hide in each other, in the catalogue's order.
+    fn several(&self, random: &mut Pcg64) -> Vec<Sort> {
+        let (all, clash) = if self.servo { (self.kinds(), &SERVO_CLASH[..]) } else { (companions(), &CLASH[..]) };
+        several(&all, clash, random)
     }
 }
 
@@ -121,13 +156,12 @@ fn known(random: &mut Pcg64) -> Sort {
     Sort::Known(companions().choose(random).copied().unwrap_or(CoulombFriction))
 }
 
-/// Two to four kinds that do not hide in each other, in the catalogue's order.
-fn several(random: &mut Pcg64) -> Vec<Sort> {
+fn several(all: &[Kind], clashes: &[&[Kind]], random: &mut Pcg64) -> Vec<Sort> {
     let count = random.random_range(2..=4);
     loop {
-        let mut kinds: Vec<Kind> = companions().sample(random, count).copied().collect();
+        let mut kinds: Vec<Kind> = all.sample(random, count).copied().collect();
         kinds.sort_unstable();
-        if CLASH.iter().all(|clash| kinds.iter().filter(|kind| clash.contains(kind)).count() < 2) {
+        if clashes.iter().all(|clash| kinds.iter().filter(|kind| clash.contains(kind)).count() < 2) {
             return kinds.into_iter().map(Sort::Known).collect();
         }
     }
@@ -152,6 +186,7 @@ mod tests {
             tests: 2,
             used: None,
             faulty: false,
+            servo: false,
         }
     }
 

@@ -5,6 +5,7 @@ use crate::arm_totals::{ArmTotals, arm_totals};
 use crate::curves::{CalibrationBin, VisibilityBin, calibration, expected_error, visibility};
 use crate::fault_judge::{FaultJudgement, FaultTotals, fault_totals};
 use crate::judge::Judgement;
+use crate::servo_totals::{ServoJudgement, ServoTotals, servo_totals};
 use crate::statistics::{mean_rounded, median, rounded};
 use crate::truth::{Group, SealedEffect, Truth, is_unknown};
 use gapscope_effects::Kind;
@@ -30,6 +31,9 @@ pub struct Score {
     /// The figures over used arms, by how used they are; nothing where there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub arms: Vec<ArmTotals>,
+    /// The figures over servo arms; nothing where there are none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub servos: Vec<ServoTotals>,
     /// The figures over cases whose logs may be wrong; nothing where there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub faults: Option<FaultTotals>,
@@ -65,6 +69,9 @@ pub struct CaseScore {
     /// How the answer did on logs that may be wrong.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fault: Option<FaultJudgement>,
+    /// How the answer did on a servo arm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub servo: Option<ServoJudgement>,
 }
 
 /// Figures over all cases. Means and medians are over all groups but the undetectable, and `None` over nothing.
@@ -145,6 +152,7 @@ impl CaseScore {
             error,
             arm: None,
             fault: None,
+            servo: None,
         }
     }
 
@@ -152,6 +160,13 @@ impl CaseScore {
     #[must_use]
     pub fn with_fault(mut self, fault: Option<FaultJudgement>) -> CaseScore {
         self.fault = fault;
+        self
+    }
+
+    /// The same with what the answer comes to on a servo arm.
+    #[must_use]
+    pub fn on_servos(mut self, servo: Option<ServoJudgement>) -> CaseScore {
+        self.servo = servo;
         self
     }
 
@@ -178,9 +193,9 @@ impl Score {
             .collect();
         let (calibration, visibility) = (calibration(&cases), visibility(&cases));
         let totals = totals(&cases, &calibration);
-        let arms = arm_totals(&cases);
+        let (arms, servos) = (arm_totals(&cases), servo_totals(&cases));
         let faults = fault_totals(&cases.iter().filter_map(|case| case.fault).collect::<Vec<_>>());
-        Score { schema: SCORE_SCHEMA.to_owned(), totals, banks, calibration, visibility, arms, faults, cases }
+        Score { schema: SCORE_SCHEMA.to_owned(), totals, banks, calibration, visibility, arms, servos, faults, cases }
     }
 
     /// Labels and counts of sealed effect against the one named first; the catalogue's order, then none, unknown and what
@@ -195,7 +210,7 @@ impl Score {
         for (sealed, row) in &self.totals.confusion {
             cells.extend(row.iter().map(|(first, n)| (label(sealed), label(first), *n)));
         }
-        let mut labels: Vec<String> = Kind::ALL.iter().map(|kind| kind.name().to_owned()).collect();
+        let mut labels: Vec<String> = Kind::ALL.iter().chain(&Kind::SERVO).map(|kind| kind.name().to_owned()).collect();
         labels.extend(["none", "unknown"].map(String::from));
         for (_, first, _) in &cells {
             if !labels.contains(first) {

@@ -4,6 +4,7 @@ use crate::fault::SealedFault;
 use gapscope_effects::Kind;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 
 /// Signature over noise below which nobody can tell an effect at a joint.
 pub const DETECTABLE: f64 = 5.0;
@@ -38,6 +39,28 @@ pub struct Truth {
     /// What is wrong with them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fault: Option<SealedFault>,
+    /// What drives a servo arm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub servo: Option<ServoTruth>,
+}
+
+/// What drives a servo arm, and how it was logged.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ServoTruth {
+    /// Whether the simulator's servo was given.
+    pub given: bool,
+    /// Stiffness of each joint's servo, N m/rad.
+    pub stiffness: BTreeMap<String, f64>,
+    /// Damping of each joint's servo, N m s/rad.
+    pub damping: BTreeMap<String, f64>,
+    /// When a row's set point arrives, from its sample on, s.
+    pub latency: f64,
+    /// Standard deviation of a sample's time, as a part of the interval.
+    pub jitter: f64,
+    /// Whether stamps are made from a nominal rate.
+    pub nominal_stamps: bool,
+    /// Part of the samples that repeat the one before.
+    pub repeated: f64,
 }
 
 /// How used an arm is.

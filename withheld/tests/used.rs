@@ -15,6 +15,7 @@ fn robot(name: &str) -> Robot {
 fn plan(used: Used, arms: usize) -> Plan {
     let mut plan = Plan {
         faulty: false,
+        servo: false,
         cases: 0,
         multi: 0,
         mixed: 0,
@@ -54,6 +55,7 @@ fn every_body_is_one_and_the_robot_that_is_handed_out_too() {
     let arm = robot("arm6");
     let spec = |used, seed| CaseSpec {
         faulty: false,
+        servo: false,
         sorts: vec![],
         used: Some(used),
         seed,

@@ -39,13 +39,14 @@ fn effect(kind: Kind) -> Effect {
 
 #[test]
 fn every_kind_has_a_card_with_words_of_its_own() {
-    let all: Vec<Kind> = Kind::ALL.into_iter().chain(Kind::OUTSIDE).collect();
+    let all: Vec<Kind> = Kind::every().collect();
     for (i, kind) in all.iter().enumerate() {
         let card = kind.card();
         assert!(!card.words.is_empty(), "{kind}: no words");
         assert!(all[..i].iter().all(|other| other.card().words != card.words), "{kind}: the words of another kind");
         let is_outside = Kind::OUTSIDE.contains(kind);
         assert_eq!(card.part == Part::Outside, is_outside, "{kind}");
+        assert_eq!(card.part == Part::Servo, Kind::SERVO.contains(kind), "{kind}");
         assert!(is_outside || !card.meaning.is_empty(), "{kind}: no meaning");
         assert!(card.knob.is_none_or(|knob| !knob.what.is_empty()), "{kind}: a knob without a name");
         assert!(card.exact_to > 0.0 && card.exact_to < 0.1, "{kind}: {}", card.exact_to);
@@ -120,7 +121,7 @@ fn a_gauge_has_a_direction_for_each_column_and_a_body_ten() {
 
 #[test]
 fn kinds_exclude_each_other_alike_and_name_others_rightly() {
-    let all = || Kind::ALL.into_iter().chain(Kind::OUTSIDE);
+    let all = Kind::every;
     for kind in all() {
         let card = kind.card();
         assert!(all().all(|other| kind.excludes(other) == other.excludes(kind)), "{kind}");

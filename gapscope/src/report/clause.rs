@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn every_kind_has_a_clause_of_its_own() {
         let (_, diagnosis, _) = sample::explained();
-        for kind in gapscope_effects::Kind::ALL {
+        for kind in gapscope_effects::Kind::ALL.into_iter().chain(gapscope_effects::Kind::SERVO) {
             let effect = FoundEffect { kind: kind.name().into(), ..diagnosis.effects[0].clone() };
             for joints in [&diagnosis.joints[..], &diagnosis.joints[..1], &[]] {
                 let clause = of(&FoundEffect { joints: joints.to_vec(), ..effect.clone() }, &diagnosis.joints, &[]);

@@ -29,6 +29,9 @@ pub fn html(score: &Score) -> String {
             @if let Some(arms) = figures::arms(score) {
                 (section("Used arms", "Friction, links, rotors and biases are off on most of them, and one further effect may be beside that; 95 % intervals in brackets.", rows(&arms)))
             }
+            @if let Some(servos) = figures::servos(score) {
+                (section("Servo arms", "1 to 7 joints, set points and no torque; the simulator’s servo is given in some; 95 % intervals in brackets.", rows(&servos)))
+            }
             @if let Some(faults) = figures::faults(score) {
                 (section("Wrong data", "Two cases in three have one thing wrong with their logs: a unit, a sign, a clock, an effort not recorded, …", rows(&faults)))
             }

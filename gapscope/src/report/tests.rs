@@ -85,7 +85,8 @@ fn every_verdict_is_well_formed_finite_small_and_repeatable() {
 
 #[test]
 fn holds_every_effect_of_the_catalogue() {
-    let kinds: Vec<&str> = Kind::ALL.iter().map(|kind| kind.name()).chain(["from_a_later_version"]).collect();
+    let kinds: Vec<&str> =
+        Kind::ALL.iter().chain(&Kind::SERVO).map(|kind| kind.name()).chain(["from_a_later_version"]).collect();
     let (_, mut diagnosis, evidence) = sample::explained();
     let pattern = diagnosis.effects[0].clone();
     diagnosis.effects = kinds.iter().map(|kind| FoundEffect { kind: (*kind).into(), ..pattern.clone() }).collect();

@@ -25,7 +25,7 @@ pub fn effects(kinds: &[String]) -> Vec<String> {
 pub fn in_words(text: &str) -> String {
     let word = |word: &str| {
         let name = word.trim_end_matches(['.', ',', ':', ';', ')']);
-        let known = name.contains('_') && Kind::ALL.into_iter().any(|kind| kind.name() == name);
+        let known = name.contains('_') && Kind::every().any(|kind| kind.name() == name);
         if known { effect(name) + &word[name.len()..] } else { word.to_owned() }
     };
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
@@ -33,13 +33,7 @@ pub fn in_words(text: &str) -> String {
 
 /// What the real robot does that the model does not, in one clause; empty for kinds outside the catalogue.
 pub fn meaning(kind: &str) -> &'static str {
-    match kind {
-        "servo_gain_error" => "the servo's proportional gain is not the one given",
-        "servo_damping_error" => "the servo's derivative gain or back-EMF is not the one given",
-        "speed_limit" => "the drive turns no faster than this",
-        "dead_band" => "the servo does nothing within an error of this size",
-        other => Kind::named(other).map_or("", |kind| kind.card().meaning),
-    }
+    Kind::named(kind).map_or("", |kind| kind.card().meaning)
 }
 
 /// A parameter's public name in words.

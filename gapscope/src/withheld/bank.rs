@@ -5,6 +5,9 @@ use anyhow::{Context, Result, bail};
 use gapscope_withheld::Truth;
 use std::path::{Path, PathBuf};
 
+/// What is known of the drives of a servo arm, beside its robot and logs.
+pub const DRIVE: &str = "servo.toml";
+
 /// What a diagnoser may see of a case, and what is sealed.
 #[derive(Debug)]
 pub struct Case {
@@ -59,6 +62,11 @@ pub fn cases(bank: &Path) -> Result<Vec<Case>> {
 }
 
 impl Case {
+    /// What is known of the drives, where it is.
+    pub fn drive(&self) -> Option<PathBuf> {
+        Some(self.open.join(DRIVE)).filter(|file| file.is_file())
+    }
+
     /// The logs to diagnose.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! `gapscope withheld make`: a bank of cases whose effects only the sealed folder knows.
 
-use super::bank::sealed_beside;
+use super::bank::{DRIVE, sealed_beside};
 use super::progress;
 use crate::cli::{Level, MakeBank};
 use crate::output;
@@ -70,6 +70,7 @@ fn plan(args: &MakeBank) -> Result<Plan> {
         episodes: args.episodes,
         tests: args.tests,
         faulty: args.faulty,
+        servo: args.servo,
         used: args.used.map(Used::try_from).transpose().map_err(anyhow::Error::msg)?,
     };
     if let Some(used) = plan.used {
@@ -79,6 +80,13 @@ fn plan(args: &MakeBank) -> Result<Plan> {
             );
         }
         plan.share_out(args.cases.unwrap_or_else(|| Plan::used_arms(used)));
+    } else if plan.servo {
+        if [multi, mixed, none, unknown].iter().any(|count| *count > 0) {
+            bail!(
+                "with --servo, --cases alone counts: a third has one effect, a third several, the rest an unknown one or none"
+            );
+        }
+        plan.share_out_servos(args.cases.unwrap_or_else(Plan::servo_arms));
     } else if counts.iter().all(Option::is_none) {
         plan.one_of_each();
     }
@@ -182,6 +190,9 @@ impl Place {
             fs::create_dir(draft).with_context(|| format!("cannot make the folder {}", draft.display()))?;
         }
         output::write(&open.join("robot.urdf"), &case.urdf)?;
+        if let Some(servo) = &case.servo {
+            output::write(&open.join(DRIVE), servo)?;
+        }
         for (folder, name, logs) in [(open, "episode", case.episodes), (sealed, "test", case.tests)] {
             for (i, log) in logs.into_iter().enumerate() {
                 write_csv(folder.join(format!("{name}_{i}.csv")), &rounded(log), false)?;

@@ -5,7 +5,7 @@ use super::trial::{gathered, kept, trials};
 use crate::cli::ScoreBank;
 use crate::{output, report};
 use anyhow::{Result, bail};
-use gapscope_withheld::{CaseScore, Score, judge, judge_arm, judge_fault};
+use gapscope_withheld::{CaseScore, Score, judge, judge_arm, judge_fault, judge_servo};
 
 /// Names of the files that a score writes.
 const RESULTS: [&str; 6] = ["score.json", "score.html", "score.md", "confusion.svg", "calibration.svg", "size.svg"];
@@ -40,6 +40,7 @@ pub fn run(args: &ScoreBank) -> Result<String> {
         let arm = judge_arm(&truth, trial.answer.as_ref(), &judgement, trial.impossible);
         Ok(CaseScore::new([&case.bank, &case.name], &truth, judgement, trial.seconds, trial.error)
             .on_arm(arm)
+            .on_servos(judge_servo(&truth, trial.answer.as_ref()))
             .with_fault(fault))
     });
     let score = Score::new(judged.collect::<Result<_>>()?);

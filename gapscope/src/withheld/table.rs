@@ -1,6 +1,6 @@
 //! A score as text.
 
-use crate::report::score::figures::{Table, arms, faults, table};
+use crate::report::score::figures::{Table, arms, faults, servos, table};
 use crate::report::terminal::{column, fill, pad};
 use gapscope_withheld::Score;
 use std::fmt::Write;
@@ -33,6 +33,9 @@ pub fn score(score: &Score) -> String {
     let mut text = rows(&table(score), BANK);
     if let Some(arms) = arms(score) {
         text.push_str(&format!("\nUsed arms (95 % intervals in brackets)\n{}", rows(&arms, ARM)));
+    }
+    if let Some(servos) = servos(score) {
+        text.push_str(&format!("\nServo arms (95 % intervals in brackets)\n{}", rows(&servos, ARM)));
     }
     if let Some(faults) = faults(score) {
         text.push_str(&format!("\nWrong data\n{}", rows(&faults, BANK)));

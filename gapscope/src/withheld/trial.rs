@@ -92,8 +92,10 @@ impl Trial {
             // An answer of an earlier run must not stand for one that fails now.
             output::remove(&kept(keep, case))?;
         }
+        let drive = case.drive();
         let mut diagnose = Command::new(exe);
         diagnose.arg("diagnose").arg(&robot).args(case.logs()?).arg("--out").arg(&out);
+        diagnose.args(drive.iter().flat_map(|file| ["--drive".as_ref(), file.as_os_str()]));
         let began = Instant::now();
         let status = finish(&mut diagnose, scratch.path(), limit)?;
         let mut trial = Trial { seconds: began.elapsed().as_secs_f64(), ..Trial::default() };
@@ -123,6 +125,7 @@ impl Trial {
         let mut evaluate = Command::new(exe);
         evaluate.arg("evaluate").arg(&robot).args(case.tests()?);
         evaluate.arg("--with").arg(corrected).arg("--json");
+        evaluate.args(drive.iter().flat_map(|file| ["--drive".as_ref(), file.as_os_str()]));
         if finish(&mut evaluate, scratch.path(), limit)?.is_some_and(|status| status.success()) {
             let text = std::fs::read_to_string(stdout(scratch.path())).unwrap_or_default();
             trial.evaluation = serde_json::from_str(&text).ok();

@@ -8,6 +8,7 @@ mod commands;
 mod formats;
 mod report;
 mod rollout;
+mod servo;
 mod support;
 mod train;
 mod withheld;

@@ -2,7 +2,7 @@
 
 use super::super::format::{NONE, figure, percent, percent_interval};
 use super::super::words;
-use gapscope_withheld::{ArmTotals, CaseScore, Group, Middle, Rate, Score, Totals};
+use gapscope_withheld::{ArmTotals, CaseScore, Group, Middle, Rate, Score, ServoTotals, Totals};
 
 /// Names of the figures and, for each bank and for all, what they are.
 #[derive(Debug)]
@@ -64,15 +64,46 @@ pub fn arms(score: &Score) -> Option<Table> {
     Some(Table { columns: score.arms.iter().map(|arms| arms.used.name().to_owned()).collect(), rows: rows.collect() })
 }
 
+/// The table of servo arms: those whose servo was given, the others, and all; `None` where there are none.
+pub fn servos(score: &Score) -> Option<Table> {
+    let figures: Vec<Vec<(&'static str, String)>> = score.servos.iter().map(servo).collect();
+    let rows = figures.first()?.iter().enumerate();
+    let rows = rows.map(|(i, (name, _))| (*name, figures.iter().map(|own| own[i].1.clone()).collect()));
+    let columns = score.servos.iter().map(|servos| format!("servo {}", servos.servo)).collect();
+    Some(Table { columns, rows: rows.collect() })
+}
+
+fn servo(t: &ServoTotals) -> Vec<(&'static str, String)> {
+    let seconds = |seconds: Option<f64>| seconds.map_or(NONE.into(), figure);
+    vec![
+        ("arms", t.n.to_string()),
+        ("the effect named first is there, or a tie that it declares", rate(&t.first)),
+        ("kinds exact, or a tie that it declares", rate(&t.kinds)),
+        ("  exact with the verdict", rate(&t.exact)),
+        ("kinds named that are not there, a case", middle(&t.invented)),
+        ("nothing claimed where nothing is", rate(&t.nothing)),
+        ("unknown flagged", rate(&t.unknown_flagged)),
+        ("  where none is", rate(&t.unknown_claimed)),
+        ("95 % intervals that hold the truth", rate(&t.intervals)),
+        ("predicted shrink of the error in position off by, mean", middle(&t.shrink_error)),
+        ("confidence: expected calibration error", middle(&t.calibration_error)),
+        ("time of a diagnosis, median, s", seconds(t.seconds_median)),
+        ("  slowest, s", seconds(t.seconds_slowest)),
+    ]
+}
+
+fn rate(rate: &Option<Rate>) -> String {
+    let text = |r: &Rate| format!("{} of {} ({})", percent(r.share()), r.of, percent_interval(r.ci95));
+    rate.as_ref().map_or(NONE.into(), text)
+}
+
+fn middle(middle: &Option<Middle>) -> String {
+    middle.as_ref().map_or(NONE.into(), |m| format!("{} of {}", figure(m.value), m.of))
+}
+
 fn arm(t: &ArmTotals) -> Vec<(&'static str, String)> {
-    let rate = |rate: &Option<Rate>| {
-        let text = |r: &Rate| format!("{} of {} ({})", percent(r.share()), r.of, percent_interval(r.ci95));
-        rate.as_ref().map_or(NONE.into(), text)
-    };
     let part =
         |middle: &Option<Middle>| middle.as_ref().map_or(NONE.into(), |m| format!("{} of {}", percent(m.value), m.of));
-    let middle =
-        |middle: &Option<Middle>| middle.as_ref().map_or(NONE.into(), |m| format!("{} of {}", figure(m.value), m.of));
     let seconds = |seconds: Option<f64>| seconds.map_or(NONE.into(), figure);
     vec![
         ("arms", t.n.to_string()),

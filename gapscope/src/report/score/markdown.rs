@@ -1,6 +1,6 @@
 //! A score as a page of documentation, its pictures in files beside it.
 
-use super::figures::{Table, arms, faults, misses, table};
+use super::figures::{Table, arms, faults, misses, servos, table};
 use gapscope_withheld::{DETECTABLE, Score};
 use std::fmt::Write;
 
@@ -21,6 +21,13 @@ pub fn page(score: &Score, call: &str, pictures: [&str; 3]) -> String {
              of how many, with their 95 % score interval (Wilson); means and medians say of how many values.\n\n",
         );
         text.push_str(&rows(&arms));
+    }
+    if let Some(servos) = servos(score) {
+        text.push_str(
+            "\n## Servo arms\n\n1 to 7 joints, set points and no torque, 12-bit encoders at 20 to 200 Hz. The simulator’s servo is given in some. \
+             Shares say of how many they are, with their 95 % interval; kinds hold of arms with effects of the catalogue.\n\n",
+        );
+        text.push_str(&rows(&servos));
     }
     if let Some(faults) = faults(score) {
         text.push_str("\n## Wrong data\n\nTwo cases in three have one thing wrong with their logs.\n\n");

@@ -79,7 +79,10 @@ mod tests {
             joints: vec!["elbow".into()],
             part: "further".into(),
             confidence: 0.9,
-            parameters: BTreeMap::from([(parameter.into(), BTreeMap::from([("elbow".into(), found)]))]),
+            parameters: BTreeMap::from([(
+                parameter.into(),
+                Parameter::PerJoint(BTreeMap::from([("elbow".into(), found)])),
+            )]),
             indistinguishable_from: vec![],
             shrink: EffectShrink { position: None },
         };

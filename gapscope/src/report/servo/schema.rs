@@ -33,15 +33,23 @@ fn unit(unit: &str) -> String {
 }
 
 pub fn effects(list: &[servo::FoundEffect]) -> Vec<FoundEffect> {
-    let parameter = |joints: &BTreeMap<String, servo::Estimate>| {
-        Parameter::PerJoint(joints.iter().map(|(joint, e)| (joint.clone(), estimate(e))).collect())
+    let parameter = |found: &servo::Parameter| match found {
+        servo::Parameter::Single(e) => Parameter::Single(estimate(e)),
+        servo::Parameter::Vector(v) => Parameter::Single(Estimate {
+            value: Quantity::Vector(v.value.clone()),
+            ci95: v.ci95.clone().map(Quantity::Vector),
+            unit: v.unit.clone(),
+        }),
+        servo::Parameter::PerJoint(joints) => {
+            Parameter::PerJoint(joints.iter().map(|(joint, e)| (joint.clone(), estimate(e))).collect())
+        }
     };
     let effect = |found: &servo::FoundEffect| FoundEffect {
         kind: found.kind.clone(),
         joints: found.joints.clone(),
         part: if found.part == "calibration" { Part::Calibration } else { Part::Further },
         confidence: found.confidence,
-        parameters: found.parameters.iter().map(|(name, joints)| (name.clone(), parameter(joints))).collect(),
+        parameters: found.parameters.iter().map(|(name, found)| (name.clone(), parameter(found))).collect(),
         indistinguishable_from: found.indistinguishable_from.clone(),
         shrink: EffectShrink { torque: found.shrink.position, ci95: None },
     };
@@ -95,7 +103,7 @@ fn curve(effect: &servo::FoundEffect, joint: &str, top: f64) -> Option<EffectCur
         _ => f64::NAN,
     };
     let found: Vec<&servo::Estimate> =
-        names.iter().map(|name| effect.parameters.get(*name)?.get(joint)).collect::<Option<_>>()?;
+        names.iter().map(|name| effect.parameters.get(*name)?.at(joint)).collect::<Option<_>>()?;
     let values: Vec<f64> = found.iter().map(|e| e.value).collect();
     let ends: Option<Vec<[f64; 2]>> = found.iter().map(|e| Some([e.ci95[0]?, e.ci95[1]?])).collect();
     // Rest is left out: friction has no one value there. Both signs of it stand next to each other.
@@ -133,7 +141,7 @@ mod tests {
     fn stribeck(high: Option<f64>) -> servo::FoundEffect {
         let one = |value: f64, ci95| {
             let found = servo::Estimate { value, ci95, unit: "N m/(N m/rad)".into(), determined: true };
-            BTreeMap::from([("a".to_owned(), found)])
+            servo::Parameter::PerJoint(BTreeMap::from([("a".to_owned(), found)]))
         };
         servo::FoundEffect {
             kind: "stribeck_friction".into(),

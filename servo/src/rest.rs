@@ -1,0 +1,96 @@
+//! Whether what is left of a joint's error is noise.
+
+use crate::law::Law;
+use crate::prepare::Joint;
+use crate::simulate::simulate;
+
+/// Time over which errors are averaged before they are held against noise, s: noise forgets within a sample or two, what an
+/// effect leaves lasts as long as a motion does.
+const SPAN: f64 = 0.15;
+/// Means of errors up to this many standard deviations of one sample's rounding are noise: no integrator is another's to better.
+const ROUNDING: f64 = 1.5;
+/// Means of errors up to this many times what errors that forget from sample to sample leave of them are noise: clocks jitter,
+/// and samples repeat.
+const WHITE: f64 = 2.5;
+
+/// What is left of a joint against what noise would leave: up to one it is noise. Root mean squares of means over [`SPAN`]; the
+/// noise of a sample is told by the change of the error from one to the next.
+pub fn structure(joint: &Joint, law: &Law) -> f64 {
+    let rounding = joint.encoder_step() / 12f64.sqrt();
+    let count = ((SPAN / joint.dt.max(1e-4)).round() as usize).max(2);
+    let mut path = Vec::new();
+    let errors: Vec<Vec<f64>> = joint
+        .runs
+        .iter()
+        .map(|run| {
+            simulate(law, run, &mut path);
+            let rows = path.iter().zip(&run.position).zip(&run.stale);
+            rows.map(|((a, b), stale)| if *stale { 0.0 } else { a - b }).collect()
+        })
+        .collect();
+    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
+    let means = rms(errors.iter().flat_map(|run| run.chunks_exact(count)).map(mean));
+    // Of white noise, half of the mean square of changes is its variance.
+    let white = rms(errors.iter().flat_map(|run| run.windows(2)).map(|pair| pair[1] - pair[0])) / 2f64.sqrt();
+    let left = means / (ROUNDING * rounding).max(WHITE * white / (count as f64).sqrt());
+    if left.is_nan() { f64::INFINITY } else { left }
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), x| (sum + x * x, count + 1.0));
+    (sum / f64::max(count, 1.0)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::{Held, Run, Signal, Surroundings};
+
+    /// A joint that rests at zero by its law, and whose log shows these positions.
+    fn joint(position: Vec<f64>) -> Joint {
+        let count = position.len();
+        let time: Vec<f64> = (0..count).map(|k| 0.01 * k as f64).collect();
+        let zeros = vec![0.0; count];
+        let around = Surroundings {
+            inertia: vec![0.01; count],
+            gravity: zeros.clone(),
+            slope: zeros.clone(),
+            coupling: zeros.clone(),
+        };
+        let run = Run {
+            target: Some(Held::new(&time, &zeros)),
+            delivered: None,
+            restarts: vec![],
+            position,
+            on: vec![true; count],
+            gain: 1.0,
+            own_gain: None,
+            seen_feedback: None,
+            around,
+            mass: 0.01,
+            weight: vec![1.0; count],
+            stale: vec![false; count],
+            time,
+            step: 5e-3,
+            log: 0,
+        };
+        Joint { runs: vec![run], ..Joint::blank(Signal::Command) }
+    }
+
+    fn law() -> Law {
+        let mut law = Law::default();
+        law[crate::law::Param::Scale] = 0.1;
+        law[crate::law::Param::Damping] = 0.1;
+        law
+    }
+
+    #[test]
+    fn rounding_is_noise_and_a_slow_error_is_not() {
+        let tick = 1.5e-3;
+        let noise = |k: usize| if (k * 7919) % 5 < 2 { 2.0 * tick } else { 0.0 };
+        let white: Vec<f64> = (0..2000).map(|k| if k == 0 { 0.0 } else { noise(k) - 0.8 * tick }).collect();
+        let slow: Vec<f64> = (0..2000).map(|k| ((0.01 * k as f64).sin() * 3.0).round() * tick).collect();
+        assert!(structure(&joint(white), &law()) <= 1.0);
+        assert!(structure(&joint(slow), &law()) > 2.0);
+    }
+}

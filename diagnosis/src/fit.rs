@@ -8,4 +8,5 @@ pub mod problem;
 pub mod refine;
 #[cfg(test)]
 pub mod support;
+pub mod sums;
 pub mod terms;

@@ -44,6 +44,9 @@ pub struct Input {
     /// Logs in memory, in the place of files; `logs` then holds their names
     #[arg(skip)]
     pub arrays: Vec<gapscope_datasets::Arrays>,
+    /// What is known of the logs already, in words: said before all else that was odd
+    #[arg(skip)]
+    pub said: Vec<String>,
 }
 
 /// How a robot and its logs are read, for every command that does.
@@ -204,6 +207,15 @@ pub(crate) fn read(
     }
 }
 
+/// The runs of logs as they stand, nothing looked for in them: all joints of the robot must be there, with their effort.
+///
+/// # Errors
+/// A file that cannot be read or that breaks a rule; the text names file, place and mend.
+pub fn runs(input: &Input, robot: &Model) -> Result<Vec<Episode>> {
+    let joints: Vec<String> = robot.joints().iter().map(|joint| joint.name.clone()).collect();
+    Ok(read(input, &joints, &options(input)?, &|_| {})?.0)
+}
+
 /// Holds the logs against themselves and the model, and undoes what is wrong with them beyond doubt.
 fn checked(
     input: &Input,
@@ -237,7 +249,8 @@ fn checked(
     // passed over least.
     let checks = check_logs(&model, &episodes);
     let (of_all, said): (Vec<Finding>, Vec<Finding>) = said.into_iter().partition(|finding| finding.about == ALL_LOGS);
-    let findings = of_all.iter().chain(&checks).chain(&said).map(ToString::to_string).collect();
+    let findings = of_all.iter().chain(&checks).chain(&said).map(ToString::to_string);
+    let findings = input.said.iter().cloned().chain(findings).collect();
     Ok(Loaded {
         model,
         episodes,

@@ -22,8 +22,10 @@ const BODY: usize = 10;
 const RIDGE: f64 = 1e-9;
 /// Rounds in which joints get weights by what is left of them.
 const ROUNDS: usize = 4;
-/// Logs are unlike those that were chosen where these leave so much more of them than a fit to all does, ...
-const UNLIKE: f64 = 1.5;
+/// Logs are unlike those that were chosen where a fit to these leaves so many times more of all than of themselves, ...
+const UNLIKE: f64 = 2.0;
+/// ... so many times more than a fit to all leaves, ...
+const WORSE: f64 = 1.25;
 /// ... and more than this part of the gap.
 const LEAST: f64 = 0.02;
 
@@ -149,17 +151,17 @@ impl Sums {
         if rest.is_empty() { Ok(sums) } else { Err(SumsError::Bytes) }
     }
 
-    /// What a linear fit to the logs of `chosen` leaves of all, N m or N: where it is much more than a fit to all leaves,
-    /// in words, joint by joint.
+    /// What a linear fit to the logs of `chosen` leaves of all, N m or N: where it is much more than it leaves of their own and
+    /// than a fit to all leaves, in words, joint by joint.
     pub fn unlike(&self, model: &Model, chosen: &Sums) -> Vec<String> {
         let (of_chosen, of_all) = (chosen.fit(model), self.fit(model));
         let mut said = Vec::new();
         for (j, joint) in model.joints().iter().enumerate() {
             let (gap, least) = (self.left(model, j, None), self.left(model, j, Some(&of_all)));
-            let left = self.left(model, j, Some(&of_chosen));
-            if left > UNLIKE * least && left > LEAST * gap {
+            let (left, own) = (self.left(model, j, Some(&of_chosen)), chosen.left(model, j, Some(&of_chosen)));
+            if left > UNLIKE * own && left > WORSE * least && left > LEAST * gap {
                 said.push(format!(
-                    "joint `{}`: bodies and friction as in the logs that were diagnosed leave a gap of {left:.3} over all logs, where a fit to all leaves {least:.3}: \
+                    "joint `{}`: bodies and friction as in the logs that were diagnosed leave a gap of {left:.3} over all logs, where they leave {own:.3} of their own: \
                      robots or days differ. Diagnose them apart, and put the results side by side with `gapscope compare`",
                     joint.name
                 ));
@@ -374,7 +376,7 @@ mod tests {
         let (chosen, mut all) = (summed(&model, &one), summed(&model, &one));
         all.merge(&summed(&model, &same)).unwrap();
         assert_eq!(all.unlike(&model, &chosen), Vec::<String>::new());
-        all.merge(&summed(&model, &logs(&model, 0.5, 12..20))).unwrap();
+        all.merge(&summed(&model, &logs(&model, 0.8, 12..20))).unwrap();
         let said = all.unlike(&model, &chosen);
         assert!(said.len() == 2 && said[0].starts_with("joint `joint1`: bodies and friction"), "{said:?}");
     }

@@ -24,7 +24,7 @@ fi
 export GAPSCOPE
 "$bin/pip" install --quiet "$WHEEL" pytest
 # Some tests need more; without it they say that they are skipped.
-for more in mujoco pandas polars matplotlib fmpy "nbclient ipykernel"; do
+for more in mujoco pandas polars matplotlib fmpy mcap "nbclient ipykernel"; do
     "$bin/pip" install --quiet $more || echo "$more does not install here: its tests are skipped"
 done
 # From elsewhere, so that the sources cannot be found instead of the wheel.

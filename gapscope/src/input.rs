@@ -164,7 +164,7 @@ fn load_with(input: &Input, options: &ReadOptions, tell: &(dyn Fn(&str) + Sync))
                 locked.extend(error.absent);
                 continue;
             }
-            Err(error) => return Err(pointed(error, input)),
+            Err(error) => return Err(pointed(error, input).into()),
             Ok(read) => read,
         };
         said.extend(notes);
@@ -174,21 +174,23 @@ fn load_with(input: &Input, options: &ReadOptions, tell: &(dyn Fn(&str) + Sync))
 }
 
 /// The error, with the way to a map where one may be what lacks.
-fn pointed(error: LogError, input: &Input) -> anyhow::Error {
+fn pointed(mut error: LogError, input: &Input) -> LogError {
     let by_names =
         matches!(error.kind, LogErrorKind::MissingColumn | LogErrorKind::MissingJoint | LogErrorKind::UnknownJoint);
     let mapped = input.reading.map_file.is_some() || !input.reading.map.is_empty();
     if !by_names || mapped || !input.arrays.is_empty() {
-        return error.into();
+        return error;
     }
     // A file may be a part of a log, which is a folder.
     let log = input.logs.iter().find(|log| error.file.starts_with(&*log.display().to_string()));
-    let Some(log) = log else { return error.into() };
-    anyhow::anyhow!(
-        "{error}. If names are what is in the way, this writes a map: gapscope inspect {} --model {} --suggest-map map.toml",
+    let Some(log) = log else { return error };
+    let way = format!(
+        "If names are what is in the way, this writes a map: gapscope inspect {} --model {} --suggest-map map.toml",
         log.display(),
         input.robot.display()
-    )
+    );
+    error.hint = if error.hint.is_empty() { way } else { format!("{}. {way}", error.hint) }.into();
+    error
 }
 
 /// The logs, from files or from memory.

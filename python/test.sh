@@ -2,13 +2,16 @@
 # Builds the wheel, installs it into a fresh environment, and runs the tests on what is installed there.
 #   python/test.sh [PYTEST ARGUMENTS]
 # WHEEL names a wheel that is built already; MATURIN_ARGS changes how one is built (default: --release);
-# GAPSCOPE names the command to compare with (default: built here).
+# GAPSCOPE names the command to compare with (default: built here); VENV names an environment that is there already.
 set -euo pipefail
 here="$(cd "$(dirname "$0")" && pwd)"
 work="$(mktemp -d)"
 trap 'rm -rf "$work"' EXIT
-python3 -m venv "$work/venv"
-bin="$work/venv/bin"
+if [ -z "${VENV:-}" ]; then
+    VENV="$work/venv"
+    python3 -m venv "$VENV"
+fi
+bin="$VENV/bin"
 if [ -z "${WHEEL:-}" ]; then
     "$bin/pip" install --quiet "maturin>=1.7,<2"
     (cd "$here" && "$bin/maturin" build --out "$work/wheels" ${MATURIN_ARGS:---release})
@@ -21,7 +24,9 @@ fi
 export GAPSCOPE
 "$bin/pip" install --quiet "$WHEEL" pytest
 # Some tests need more; without it they say that they are skipped.
-"$bin/pip" install --quiet mujoco pandas polars matplotlib || echo "not all of mujoco, pandas, polars, matplotlib install here"
+for more in mujoco pandas polars matplotlib fmpy mcap "nbclient ipykernel"; do
+    "$bin/pip" install --quiet $more || echo "$more does not install here: its tests are skipped"
+done
 # From elsewhere, so that the sources cannot be found instead of the wheel.
 cd "$work"
 "$bin/python" -m pytest -q -p no:cacheprovider "$here/tests" "$@"

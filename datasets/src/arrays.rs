@@ -59,10 +59,15 @@ pub(crate) fn recording(arrays: Vec<Array>, rate: Option<f64>, request: &Request
     let held: Vec<String> = arrays.iter().map(|array| format!("{} {:?}", array.name, array.shape)).collect();
     let mut channels = Vec::new();
     let mut passed_over = Vec::new();
+    let mut unfit = None;
     for array in arrays.into_iter().filter(|array| !array.values.is_empty()) {
         let (name, is_time, scalar) = (array.name.clone(), is_time(&array), array.values.len() == 1);
         let channel = channel_names::channel(array.own_name()).filter(|_| !is_time);
+        let shape = array.shape.clone();
         let Some(columns) = columns(array, count) else {
+            if channel == Some(Channel::Effort) && !scalar {
+                unfit = unfit.or_else(|| Some((name.clone(), shape)));
+            }
             passed_over.extend((!scalar).then_some(name));
             continue;
         };
@@ -90,6 +95,17 @@ pub(crate) fn recording(arrays: Vec<Array>, rate: Option<f64>, request: &Request
         recording.notes.push("the file does not name its joints: they are taken in the robot's order".to_owned());
     }
     require(&channels, &held, request)?;
+    // Without its effort a log is answered as one of a servo: that is no way to read an array that is cut off.
+    if let Some((name, shape)) =
+        unfit.filter(|_| !request.look && !request.by_own_names() && !channels.contains(&Channel::Effort))
+    {
+        return Err(LogError::new(
+            LogErrorKind::RaggedRow,
+            format!("it has the shape {shape:?}, the log {count} samples"),
+        )
+        .column(name)
+        .hint("Give one row per sample, or leave the array out of the log"));
+    }
     if !passed_over.is_empty() {
         passed_over.truncate(8);
         recording.notes.push(format!("arrays that are not read: {}", passed_over.join(", ")));

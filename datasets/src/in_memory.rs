@@ -154,5 +154,14 @@ mod tests {
         assert_eq!((episodes.len(), episodes[0].name.as_str()), (1, "good"));
         assert!(findings[0].to_string().contains("left out"), "{findings:?}");
         assert!(read_arrays(&[], &joints(), &lenient).unwrap_err().to_string().contains("no log is given"));
+        // An effort that is cut off, beside set points that would do without it.
+        let mut cut = whole(&["a", "b"]);
+        cut.arrays.push(("command".to_owned(), vec![30, 2], cut.arrays[1].2.clone()));
+        cut.arrays[2] = ("effort".to_owned(), vec![5, 2], vec![1.0; 10]);
+        let servo = ReadOptions { without_effort: true, ..ReadOptions::default() };
+        let error = read_arrays(&[cut.clone()], &joints(), &servo).unwrap_err().to_string();
+        assert!(error.contains("`effort`: it has the shape [5, 2], the log 30 samples"), "{error}");
+        cut.arrays.remove(2);
+        assert!(read_arrays(&[cut], &joints(), &servo).is_ok());
     }
 }

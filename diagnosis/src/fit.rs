@@ -6,6 +6,7 @@ pub mod held;
 pub mod plant;
 pub mod problem;
 pub mod refine;
+pub mod sums;
 #[cfg(test)]
 pub mod support;
 pub mod terms;

@@ -20,5 +20,6 @@ pub use carry::corrected::{Corrected, CorrectedError, MODEL_SCHEMA, Origin};
 pub use carry::evaluate::{Predictions, evaluate, torque_changes};
 pub use carry::rollout::{BoundGrowth, Contender, ModelRollouts, RolloutError, RolloutOptions, rollouts};
 pub use diagnose::{Outcome, diagnose};
+pub use fit::sums::{Place, Sums, SumsError};
 pub use gapscope_effects::EncoderSide;
 pub use record::logs::Progress;

@@ -260,8 +260,34 @@ mod tests {
     }
 
     #[test]
+    fn one_force_under_two_names_is_compared_and_not_none() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path();
+        let friction = |kind: &str, more: &str| {
+            format!(
+                r#"{{"schema": "gapscope.diagnosis/1", "robot": "arm", "effects": [{{"kind": "{kind}", "joints": ["a"], "parameters":
+                {{"coulomb": {{"a": {{"value": 0.5, "ci95": [0.45, 0.55], "unit": "N m"}}}}{more}}}}}],
+                "power": [{{"kind": "coulomb_friction", "joints": ["a"], "parameter": "coulomb", "size": 0.05, "unit": "N m"}}]}}"#
+            )
+        };
+        let rise = r#", "static": {"a": {"value": 0.9, "ci95": [0.8, 1.0], "unit": "N m"}}"#;
+        fs::write(folder.join("one.json"), friction("coulomb_friction", "")).unwrap();
+        fs::write(folder.join("two.json"), friction("stribeck_friction", rise)).unwrap();
+        let json: serde_json::Value =
+            serde_json::from_str(&told(folder, &["one.json", "two.json"], &["json"]).unwrap()).unwrap();
+        let rows = json["parameters"].as_array().unwrap();
+        assert_eq!(rows.len(), 2, "{rows:#?}");
+        assert_eq!((&rows[0]["parameter"], &rows[0]["answer"]), (&"coulomb".into(), &"common".into()));
+        assert_eq!(rows[0]["told"][1]["under"], "stribeck_friction");
+        // The first has friction, if not by this law: that is no `none`.
+        assert_eq!((&rows[1]["parameter"], &rows[1]["answer"]), (&"static".into(), &"open".into()));
+        let text = told(folder, &["two.json", "one.json"], &[]).unwrap();
+        assert!(text.contains("common; as coulomb_friction in one.json"), "{text}");
+    }
+
+    #[test]
     fn many_parameters_need_more_to_differ_and_values_alone_stay_open() {
-        let of = |value: f64, half: Option<f64>| Some(Told { value, half, found: true });
+        let of = |value: f64, half: Option<f64>| Some(Told { value, half, found: true, under: None });
         let key = || read::Key { kind: "k".into(), parameter: "p".into(), joint: None, component: None };
         let three = row(key(), "N".into(), vec![of(1.0, Some(0.1)), of(1.0, Some(0.1)), of(1.3, Some(0.1))]);
         // Of two degrees, which is less than the root of the sum.

@@ -13,7 +13,8 @@ use gapscope_diagnosis::Corrected;
 use gapscope_diagnosis::schema::Diagnosis;
 use gapscope_dynamics::{Loaded, Model};
 use gapscope_export::{
-    DT, Exported, LEDGER_SCHEMA, Ledger, Ranges, Robot, SAMPLER, Target, TargetLedger, export, weights as weights_for_c,
+    DT, Exported, LEDGER_SCHEMA, Ledger, Ranges, Robot, SAMPLER, Target, TargetLedger, export, fmu,
+    weights as weights_for_c,
 };
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -41,20 +42,19 @@ pub fn run(args: &Export) -> Result<String> {
         Some(out) => out.clone(),
         None => output::new_folder(file.parent().unwrap_or(std::path::Path::new("")), "export")?,
     };
+    let asked: Vec<Target> = args.to.iter().map(|&target| target.into()).collect();
     let mut targets: Vec<Target> = Vec::new();
-    for target in args.to.iter().map(|&target| target.into()) {
+    for target in asked.iter().copied().chain(asked.iter().filter_map(|target| target.needs())) {
         if !targets.contains(&target) {
             targets.push(target);
         }
     }
-    if targets.contains(&Target::IsaacLab) && !targets.contains(&Target::Urdf) {
-        targets.push(Target::Urdf);
-    }
     ensure!(
-        args.residual.is_none() || targets.contains(&Target::C),
-        "a residual is written for the target c alone; add it: --to c"
+        args.residual.is_none() || targets.iter().any(|target| matches!(target, Target::C | Target::Fmu)),
+        "a residual is written for the targets c, cpp and fmu alone; add one: --to c"
     );
-    let weights = args.residual.is_some().then_some(RESIDUAL);
+    // An FMU has the weights in itself.
+    let weights = (args.residual.is_some() && targets.contains(&Target::C)).then_some(RESIDUAL);
     let ledger = (!targets.is_empty()).then_some(LEDGER);
     let regions = if args.ranges { &RANGES[..] } else { &[] };
     let names = targets.iter().map(|target| target.file()).chain(ledger).chain(weights).chain(regions.iter().copied());
@@ -78,13 +78,21 @@ pub fn run(args: &Export) -> Result<String> {
     let residual = args.residual.as_ref().map(|path| residual(path, &loaded.model, &corrected)).transpose()?;
     let dt = step(args.dt, residual.as_ref())?;
     let robot = Robot { text: description.text(), loaded: &loaded, is_mjcf: description.is_mjcf(), dt };
-    let exported: Vec<Exported> =
+    let mut exported: Vec<Exported> =
         targets.iter().map(|&target| Ok(export(target, &robot, &corrected, &logs)?)).collect::<Result<_>>()?;
-    for (exported, file) in exported.iter().zip(&files) {
-        output::write(file, &exported.text)?;
+    let network =
+        residual.as_ref().map(|Trained { network, on, dt, .. }| weights_for_c(network, *on, loaded.model.dof(), *dt));
+    for (exported, file) in exported.iter_mut().zip(&files) {
+        if exported.target == Target::Fmu {
+            let unit = fmu(&loaded.model, &exported.text, dt, network.as_deref())?;
+            exported.ledger.notes.push(unit.note);
+            output::write_bytes(file, &unit.bytes)?;
+        } else {
+            output::write(file, &exported.text)?;
+        }
     }
-    if let Some(Trained { network, on, dt, .. }) = &residual {
-        output::write_bytes(&out.join(RESIDUAL), &weights_for_c(network, *on, loaded.model.dof(), *dt))?;
+    if let (Some(name), Some(network)) = (weights, &network) {
+        output::write_bytes(&out.join(name), network)?;
     }
     let mut told = String::new();
     if let Some(ranges) = &ranges {
@@ -163,7 +171,10 @@ fn residual(path: &std::path::Path, robot: &Model, corrected: &Corrected) -> Res
 }
 
 /// The length of a step, s: the one asked for, which a residual's must be.
-fn step(asked: Option<f64>, residual: Option<&Trained>) -> Result<f64> {
+///
+/// # Errors
+/// A length that is none, or that a residual was not trained for.
+pub fn step(asked: Option<f64>, residual: Option<&Trained>) -> Result<f64> {
     let dt = asked.or(residual.map(|residual| residual.dt)).unwrap_or(DT);
     ensure!(dt.is_finite() && (1e-6..=1.0).contains(&dt), "--dt is {dt}, expected seconds from 0.000001 to 1");
     if let Some(other) = residual.map(|residual| residual.dt).filter(|other| *other != dt) {
@@ -350,6 +361,27 @@ mod tests {
         run(&own[..7]).unwrap();
         run(&own[..6]).unwrap();
         assert!(folder.join("export/robot.urdf").exists() && folder.join("export.2/robot.urdf").exists());
+    }
+
+    #[test]
+    fn covers_come_with_the_c_file_and_a_unit_with_its_note() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path();
+        case(folder);
+        let (robot, out) = (folder.join("logs/robot.urdf"), folder.join("out"));
+        let words = ["export", path(folder), "--robot", path(&robot), "--to", "cpp,fmu,simulink", "--out", path(&out)];
+        let told = run(&words).unwrap();
+        let mut names: Vec<String> =
+            std::fs::read_dir(&out).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        assert_eq!(names, ["ledger.json", "robot.c", "robot.fmu", "robot.hpp", "robot_sfun.c"]);
+        assert!(std::fs::read(out.join("robot.fmu")).unwrap().starts_with(b"PK"));
+        assert!(told.contains("a binary for ") || told.contains("no binary"), "{told}");
+        let ledger: Ledger = serde_json::from_str(&std::fs::read_to_string(out.join(LEDGER)).unwrap()).unwrap();
+        assert_eq!(ledger.targets.len(), 4);
+        assert!(
+            ledger.targets.iter().all(|target| target.effects.iter().all(|effect| effect.how.words() == "written"))
+        );
     }
 
     #[test]

@@ -44,6 +44,9 @@ pub struct Input {
     /// Logs in memory, in the place of files; `logs` then holds their names
     #[arg(skip)]
     pub arrays: Vec<gapscope_datasets::Arrays>,
+    /// What is known of the logs already, in words: said before all else that was odd
+    #[arg(skip)]
+    pub said: Vec<String>,
 }
 
 /// How a robot and its logs are read, for every command that does.
@@ -161,7 +164,7 @@ fn load_with(input: &Input, options: &ReadOptions, tell: &(dyn Fn(&str) + Sync))
                 locked.extend(error.absent);
                 continue;
             }
-            Err(error) => return Err(pointed(error, input)),
+            Err(error) => return Err(pointed(error, input).into()),
             Ok(read) => read,
         };
         said.extend(notes);
@@ -171,21 +174,23 @@ fn load_with(input: &Input, options: &ReadOptions, tell: &(dyn Fn(&str) + Sync))
 }
 
 /// The error, with the way to a map where one may be what lacks.
-fn pointed(error: LogError, input: &Input) -> anyhow::Error {
+fn pointed(mut error: LogError, input: &Input) -> LogError {
     let by_names =
         matches!(error.kind, LogErrorKind::MissingColumn | LogErrorKind::MissingJoint | LogErrorKind::UnknownJoint);
     let mapped = input.reading.map_file.is_some() || !input.reading.map.is_empty();
     if !by_names || mapped || !input.arrays.is_empty() {
-        return error.into();
+        return error;
     }
     // A file may be a part of a log, which is a folder.
     let log = input.logs.iter().find(|log| error.file.starts_with(&*log.display().to_string()));
-    let Some(log) = log else { return error.into() };
-    anyhow::anyhow!(
-        "{error}. If names are what is in the way, this writes a map: gapscope inspect {} --model {} --suggest-map map.toml",
+    let Some(log) = log else { return error };
+    let way = format!(
+        "If names are what is in the way, this writes a map: gapscope inspect {} --model {} --suggest-map map.toml",
         log.display(),
         input.robot.display()
-    )
+    );
+    error.hint = if error.hint.is_empty() { way } else { format!("{}. {way}", error.hint) }.into();
+    error
 }
 
 /// The logs, from files or from memory.
@@ -202,6 +207,15 @@ pub(crate) fn read(
         [] => read_logs_telling(&input.logs, joints, options, tell),
         arrays => read_arrays(arrays, joints, options),
     }
+}
+
+/// The runs of logs as they stand, nothing looked for in them: all joints of the robot must be there, with their effort.
+///
+/// # Errors
+/// A file that cannot be read or that breaks a rule; the text names file, place and mend.
+pub fn runs(input: &Input, robot: &Model) -> Result<Vec<Episode>> {
+    let joints: Vec<String> = robot.joints().iter().map(|joint| joint.name.clone()).collect();
+    Ok(read(input, &joints, &options(input)?, &|_| {})?.0)
 }
 
 /// Holds the logs against themselves and the model, and undoes what is wrong with them beyond doubt.
@@ -237,7 +251,8 @@ fn checked(
     // passed over least.
     let checks = check_logs(&model, &episodes);
     let (of_all, said): (Vec<Finding>, Vec<Finding>) = said.into_iter().partition(|finding| finding.about == ALL_LOGS);
-    let findings = of_all.iter().chain(&checks).chain(&said).map(ToString::to_string).collect();
+    let findings = of_all.iter().chain(&checks).chain(&said).map(ToString::to_string);
+    let findings = input.said.iter().cloned().chain(findings).collect();
     Ok(Loaded {
         model,
         episodes,

@@ -46,9 +46,16 @@ pub fn load(path: &Path, kind: Kind, robot: &Model) -> Result<Contender> {
     if kind == Kind::Residual {
         return Ok(Contender::with_own_step("hybrid", residual(path, robot)?));
     }
-    let Trained { network, dt, .. } = read(path, kind, robot)?;
-    let pure = Pure::new(robot.dof(), dt, Net::new(network)).with_context(|| unfit(path))?;
-    Ok(Contender::with_own_step("pure", pure))
+    Ok(Contender::with_own_step("pure", pure(path, robot)?))
+}
+
+/// The network alone in such a folder.
+///
+/// # Errors
+/// As those of [`load`].
+pub fn pure(path: &Path, robot: &Model) -> Result<Pure<Net<f32>>> {
+    let Trained { network, dt, .. } = read(path, Kind::Pure, robot)?;
+    Pure::new(robot.dof(), dt, Net::new(network)).with_context(|| unfit(path))
 }
 
 /// The residual in such a folder, on the physics that it was trained on.

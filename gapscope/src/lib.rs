@@ -7,7 +7,7 @@ mod compare;
 mod demo;
 pub mod diagnose;
 pub mod evaluate;
-mod export;
+pub mod export;
 pub mod generate;
 mod index;
 pub mod input;

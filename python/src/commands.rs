@@ -1,14 +1,14 @@
 //! The commands: arguments as the command line takes them, results in memory instead of files.
 
+use crate::arrays::{log, table};
 use crate::error::{Error, exception};
 use crate::given::Given;
 use crate::work::work;
 use clap::Parser;
 use gapscope::cli::{Cli, Command, Input};
-use gapscope_datasets::{Channel, Episode};
 use gapscope_diagnosis::{ModelRollouts, Predictions};
 use gapscope_rollout::Quantiles;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use std::path::Path;
@@ -146,14 +146,15 @@ fn growth<'py>(py: Python<'py>, model: &ModelRollouts) -> PyResult<Bound<'py, Py
 type Trained<'py> = (Vec<(String, Bound<'py, PyBytes>)>, String, Vec<String>);
 
 #[pyfunction]
-#[pyo3(signature = (given, flags, progress=None))]
+#[pyo3(signature = (kind, given, flags, progress=None))]
 pub fn train<'py>(
     py: Python<'py>,
+    kind: &str,
     given: Given<'py>,
     flags: Vec<String>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Trained<'py>> {
-    let words = ["train", "residual", "robot", "log"];
+    let words = ["train", kind, "robot", "log"];
     let Command::Train(mut args) = parsed(&words, &flags)? else { return Err(other_command()) };
     args.input = given.input()?;
     let (trained, notes) = work(py, progress, move |watch| {
@@ -189,25 +190,6 @@ pub fn generate<'py>(py: Python<'py>, robot: &str, flags: Vec<String>, written: 
         logs.append(log(py, episode)?)?;
     }
     Ok((urdf, effects, logs))
-}
-
-/// A log as arrays: `joints`, `time` (T,), and each quantity (T, n).
-fn log<'py>(py: Python<'py>, episode: &Episode) -> PyResult<Bound<'py, PyDict>> {
-    let log = PyDict::new(py);
-    log.set_item("joints", &episode.joints)?;
-    log.set_item("time", PyArray1::from_slice(py, &episode.time))?;
-    for channel in Channel::ALL {
-        if let Some(rows) = episode.channel(channel) {
-            log.set_item(channel.name(), table(py, rows, episode.len())?)?;
-        }
-    }
-    Ok(log)
-}
-
-/// Joint-major rows as an array (samples, joints).
-fn table<'py>(py: Python<'py>, rows: &[Vec<f64>], samples: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let all: Vec<f64> = (0..samples).flat_map(|k| rows.iter().map(move |row| row[k])).collect();
-    PyArray1::from_vec(py, all).reshape([samples, rows.len()])
 }
 
 /// Which, where and how far, a sentence each, of a diagnosis.json.

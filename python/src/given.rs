@@ -44,6 +44,7 @@ pub struct Given<'py> {
     allow_truncated: bool,
     skip_bad_logs: bool,
     as_logged: bool,
+    said: Vec<String>,
 }
 
 impl Given<'_> {
@@ -66,6 +67,7 @@ impl Given<'_> {
             skip_bad_logs: self.skip_bad_logs,
             as_logged: self.as_logged,
             arrays,
+            said: self.said,
         })
     }
 }

@@ -1,6 +1,7 @@
 //! `gapscope._native`: what of the Python package is Rust. The package's own modules in `package/gapscope` make of it what
 //! users see: objects that read well, pickle and plot.
 
+mod arrays;
 mod commands;
 mod effects;
 mod error;
@@ -8,6 +9,7 @@ mod export;
 mod given;
 mod model;
 mod network;
+mod sums;
 mod work;
 
 use pyo3::prelude::*;
@@ -24,6 +26,8 @@ mod _native {
     use super::model::Model;
     #[pymodule_export]
     use super::network::Network;
+    #[pymodule_export]
+    use super::sums::Sums;
 
     use super::*;
 

@@ -1,11 +1,12 @@
 //! A robot's rigid-body model on arrays.
 
-use crate::error::{Error, exception};
+use crate::arrays::Rows;
+use crate::error::exception;
 use crate::work::pool;
 use gapscope::robot::{self, Description};
 use gapscope_dynamics::{Data, JointKind, Loaded};
 use nalgebra::DMatrix;
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayDyn};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
@@ -217,12 +218,9 @@ impl Model {
         f: impl Fn(&mut Data, [&[f64]; K], &mut [f64]) + Sync,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let n = self.dof();
-        let (inputs, mut shape) = rows(py, n, inputs)?;
-        let mut slices: [&[f64]; K] = [&[]; K];
-        for (slice, input) in slices.iter_mut().zip(&inputs) {
-            *slice = input.as_slice()?;
-        }
-        let (count, width) = (shape.iter().product::<usize>(), inner.iter().product::<usize>());
+        let rows = Rows::read(py, n, inputs)?;
+        let slices = rows.slices()?;
+        let (count, width) = (rows.outer.iter().product::<usize>(), inner.iter().product::<usize>());
         let model = &self.loaded.model;
         let block = |first: usize, out: &mut [f64]| {
             let mut data = Data::new(model);
@@ -243,36 +241,6 @@ impl Model {
             }
             out
         });
-        shape.extend(inner);
-        PyArray1::from_vec(py, out).reshape(shape)
+        rows.shaped(py, out, inner)
     }
-}
-
-/// Array-likes as contiguous float64 arrays of one shape (..., n), in place where they are that already; and the axes before n.
-///
-/// # Errors
-/// What NumPy cannot make an array of numbers; another length than n; shapes that differ.
-pub fn rows<'py, const K: usize>(
-    py: Python<'py>,
-    n: usize,
-    inputs: [(&str, &Bound<'py, PyAny>); K],
-) -> PyResult<(Vec<PyReadonlyArrayDyn<'py, f64>>, Vec<usize>)> {
-    let make = py.import("numpy")?.getattr("ascontiguousarray")?;
-    let mut arrays: Vec<PyReadonlyArrayDyn<'py, f64>> = Vec::with_capacity(K);
-    for (name, input) in inputs {
-        let array: PyReadonlyArrayDyn<'py, f64> = make.call1((input, "float64"))?.extract()?;
-        let shape = array.shape();
-        if shape.last() != Some(&n) {
-            return Err(Error::new_err(format!(
-                "`{name}` has shape {shape:?}, expected {n} along its last axis, one for each joint"
-            )));
-        }
-        if let Some(first) = arrays.first().filter(|first| first.shape() != shape) {
-            let (expected, first) = (first.shape(), inputs[0].0);
-            return Err(Error::new_err(format!("`{name}` has shape {shape:?}, expected {expected:?} as `{first}`")));
-        }
-        arrays.push(array);
-    }
-    let outer = arrays.first().map_or_else(Vec::new, |array| array.shape()[..array.ndim() - 1].to_vec());
-    Ok((arrays, outer))
 }

@@ -1,36 +1,54 @@
-//! A residual network on the robot's own model.
+//! Networks that step a robot: a residual on its own model, or one alone.
 
+use crate::arrays::Rows;
 use crate::error::exception;
-use crate::model::{Model, rows};
+use crate::model::Model;
+use gapscope::cli::Kind;
+use gapscope::learned;
 use gapscope_dynamics::StepModel;
 use gapscope_effects::Plant;
 use gapscope_network::Net;
+use gapscope_pure::Pure;
 use gapscope_residual::Hybrid;
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
+use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// Physics with a trained residual, as `gapscope train residual` leaves it in a folder.
+/// A network as `gapscope train` leaves it in a folder.
 #[pyclass(module = "gapscope._native", frozen)]
 pub struct Network {
-    hybrid: Hybrid<Plant, Net<f32>>,
+    stepper: Stepper,
+}
+
+enum Stepper {
+    Residual(Box<Hybrid<Plant, Net<f32>>>),
+    Pure(Box<Pure<Net<f32>>>),
 }
 
 #[pymethods]
 impl Network {
-    /// Reads the network of a folder, for this robot.
+    /// Reads the network of a folder, of kind `residual` or `pure`, for this robot.
     #[new]
-    fn new(folder: PathBuf, model: &Model) -> PyResult<Network> {
-        Ok(Network { hybrid: gapscope::learned::residual(&folder, &model.loaded.model).map_err(exception)? })
+    fn new(kind: &str, folder: PathBuf, model: &Model) -> PyResult<Network> {
+        let robot = &model.loaded.model;
+        let stepper = if kind == Kind::Pure.name() {
+            learned::pure(&folder, robot).map(|pure| Stepper::Pure(Box::new(pure)))
+        } else {
+            learned::residual(&folder, robot).map(|hybrid| Stepper::Residual(Box::new(hybrid)))
+        };
+        Ok(Network { stepper: stepper.map_err(exception)? })
     }
 
     /// Time of a step, s.
     #[getter]
     fn dt(&self) -> f64 {
-        self.hybrid.dt()
+        match &self.stepper {
+            Stepper::Residual(hybrid) => hybrid.dt(),
+            Stepper::Pure(pure) => pure.dt(),
+        }
     }
 
-    /// The states one step later, (..., 2n): positions, then velocities; by physics alone where `learned` is off.
+    /// The states one step later, (..., 2n): positions, then velocities; of a residual by physics alone where `learned` is off.
     fn step<'py>(
         &self,
         py: Python<'py>,
@@ -39,26 +57,31 @@ impl Network {
         tau: &Bound<'py, PyAny>,
         learned: bool,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let n = self.hybrid.joints();
-        let (inputs, mut shape) = rows(py, n, [("q", q), ("v", v), ("tau", tau)])?;
-        let [q, v, tau] = [inputs[0].as_slice()?, inputs[1].as_slice()?, inputs[2].as_slice()?];
-        let hybrid = &self.hybrid;
-        let next = py.detach(move || {
-            let (mut hybrid, mut physics) = (hybrid.clone(), hybrid.physics().clone());
-            let mut x = vec![0.0; hybrid.state_len()];
-            let mut next = Vec::with_capacity(2 * q.len());
-            for ((q, v), tau) in q.chunks_exact(n).zip(v.chunks_exact(n)).zip(tau.chunks_exact(n)) {
-                hybrid.start(q, v, &mut x);
-                if learned {
-                    hybrid.step(&mut x, tau)
-                } else {
-                    physics.step(&mut x, tau)
-                }
-                next.extend_from_slice(&x[..2 * n]);
-            }
-            next
+        let stepper = &self.stepper;
+        let n = match stepper {
+            Stepper::Residual(hybrid) => hybrid.joints(),
+            Stepper::Pure(pure) => pure.joints(),
+        };
+        let rows = Rows::read(py, n, [("q", q), ("v", v), ("tau", tau)])?;
+        let [q, v, tau] = rows.slices()?;
+        let next = py.detach(move || match stepper {
+            Stepper::Residual(hybrid) if learned => stepped(&mut *hybrid.clone(), [q, v, tau]),
+            Stepper::Residual(hybrid) => stepped(&mut hybrid.physics().clone(), [q, v, tau]),
+            Stepper::Pure(pure) => stepped(&mut *pure.clone(), [q, v, tau]),
         });
-        shape.push(2 * n);
-        PyArray1::from_vec(py, next).reshape(shape)
+        rows.shaped(py, next, &[2 * n])
     }
+}
+
+/// Each state one step later.
+fn stepped(model: &mut impl StepModel, [q, v, tau]: [&[f64]; 3]) -> Vec<f64> {
+    let n = model.joints();
+    let mut x = vec![0.0; model.state_len()];
+    let mut next = Vec::with_capacity(2 * q.len());
+    for ((q, v), tau) in q.chunks_exact(n).zip(v.chunks_exact(n)).zip(tau.chunks_exact(n)) {
+        model.start(q, v, &mut x);
+        model.step(&mut x, tau);
+        next.extend_from_slice(&x[..2 * n]);
+    }
+    next
 }

@@ -97,6 +97,33 @@ def test_residual(case, tmp_path):
     assert rollouts.models[1]["model"] == "hybrid"
 
 
+def test_a_residual_on_the_corrected_model_has_little_left_to_learn(case):
+    settings = dict(epochs=5, hidden=[8], seed=1)
+    bare = gapscope.Residual.train(case.robot, case.logs, **settings)
+    on_top = gapscope.Residual.train(case.robot, case.logs, corrections=case.diagnosis, **settings)
+    assert on_top.training["held_out"]["physics"] < 0.2 * bare.training["held_out"]["physics"]
+    # What it stands on goes with it.
+    log = case.generated.logs[0]
+    state = log["position"][50], np.zeros(2), log["effort"][50]
+    assert np.abs(pickle.loads(pickle.dumps(on_top)).physics(*state)[1] - bare.physics(*state)[1]).max() > 1e-4
+
+
+def test_a_network_alone(case, tmp_path):
+    trained = gapscope.Pure.train(case.robot, case.logs, epochs=20, hidden=[24], seed=1)
+    assert repr(trained).startswith("Pure of double_pendulum, steps of") and not hasattr(trained, "physics")
+    log = case.generated.logs[0]
+    state = log["position"][50:60], np.zeros((10, 2)), log["effort"][50:60]
+    expected = trained.predict(*state)[1]
+    trained.save(tmp_path / "pure")
+    for again in (pickle.loads(pickle.dumps(trained)), gapscope.Pure.load(tmp_path / "pure", case.robot)):
+        np.testing.assert_array_equal(again.predict(*state)[1], expected)
+    with pytest.raises(gapscope.Error, match="holds a pure network, expected a residual"):
+        gapscope.Residual.load(tmp_path / "pure", case.robot)
+    for pure in (trained, tmp_path / "pure"):
+        rollouts = gapscope.rollout(case.robot, case.logs, pure=pure, horizon=0.1, starts=10)
+        assert [model["model"] for model in rollouts.models] == ["nominal", "pure"]
+
+
 def test_errors_have_the_sentences_of_the_command(case, command, tmp_path):
     bad = tmp_path / "bad.csv"
     bad.write_text(case.logs[0].read_text().replace("effort.joint2", "effort.elbow"))

@@ -65,7 +65,7 @@ def test_it_finds_what_is_there_and_says_so_in_three_lines(case):
     assert {"proposed", "against", "odds", "taken"} <= set(diagnosis.why[0])
     page = diagnosis._repr_html_()
     assert page.startswith("<iframe srcdoc=") and "&lt;html" in page and page.count("<") == 2
-    assert diagnosis.summary.startswith("Joint") and "\ndouble_pendulum · 2 joints" in diagnosis.summary
+    assert diagnosis.summary.startswith("joint1 and joint2 rub") and "\ndouble_pendulum · 2 joints" in diagnosis.summary
     kinds = [effect["kind"] for effect in json.loads(diagnosis.files["corrected.json"])["effects"]]
     assert diagnosis.corrections.kinds == kinds and set(kinds) == {effect.kind for effect in diagnosis.effects}
 

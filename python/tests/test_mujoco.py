@@ -1,6 +1,7 @@
 """From a diagnosis into MuJoCo itself."""
 
 import runpy
+import shutil
 import sys
 from pathlib import Path
 
@@ -10,19 +11,47 @@ import pytest
 
 mujoco = pytest.importorskip("mujoco")
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "python.md"
-EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "mujoco_day.py"
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs" / "python.md"
+EXAMPLE = ROOT / "python" / "examples" / "mujoco_day.py"
+#: One run in every container, of two links that have 0.4 N m s/rad of friction in each joint and whose URDF has none.
+RUN = ROOT / "datasets" / "tests" / "formats" / "same"
+TWO_LINKS = """<robot name="two_links"><link name="base"/>
+<link name="upper"><inertial><mass value="1"/><inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="lower"><inertial><mass value="0.5"/><inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" effort="9" velocity="20"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" effort="9" velocity="20"/></joint>
+</robot>"""
+
+
+def first_program(page):
+    """The first block of Python of a page, ten lines at most."""
+    program = page.read_text("utf-8").split("```python\n", 1)[1].split("```", 1)[0]
+    assert len(program.strip().split("\n")) <= 10
+    return compile(program, str(page), "exec")
+
+
+@pytest.mark.parametrize("name", ["lerobot_v30", "lerobot_v21", "bag", "run.mcap"])
+def test_the_ten_lines_of_the_readme_go_from_a_dataset_or_a_bag_to_a_model_that_mujoco_loads(name, tmp_path, monkeypatch):
+    copy = shutil.copytree if (RUN / name).is_dir() else shutil.copy
+    copy(RUN / name, tmp_path / "my_dataset")
+    (tmp_path / "robot.urdf").write_text(TWO_LINKS)
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(first_program(ROOT / "README.md"), names)
+    assert (tmp_path / "corrected.xml").is_file()
+    for joint in ("shoulder", "elbow"):
+        assert names["model"].joint(joint).damping[0] == pytest.approx(0.4, rel=0.05), joint
 
 
 def test_the_ten_lines_of_the_docs_end_in_a_model_that_mujoco_loads(case, tmp_path, monkeypatch):
-    text = DOCS.read_text("utf-8")
-    program = text.split("```python\n", 1)[1].split("```", 1)[0]
-    assert len(program.strip().split("\n")) <= 10
     monkeypatch.chdir(tmp_path)
     for name in ("robot.urdf", "episode_0.csv", "episode_1.csv"):
         (tmp_path / name).write_bytes((case.folder / name).read_bytes())
     names = {}
-    exec(compile(program, str(DOCS), "exec"), names)
+    exec(first_program(DOCS), names)
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "corrected.xml"))
     assert model.joint("joint1").damping[0] == pytest.approx(0.15, rel=0.1)
     assert model.joint("joint1").frictionloss[0] == pytest.approx(0.3, rel=0.1)

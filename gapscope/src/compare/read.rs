@@ -3,7 +3,7 @@
 use super::Row;
 use anyhow::{Context, Result, bail};
 use gapscope_diagnosis::schema::{self, Parameter, Power, Quantity};
-use gapscope_effects::Effect;
+use gapscope_effects::{Effect, Kind};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,6 +17,9 @@ pub struct Told {
     pub half: Option<f64>,
     /// Whether the effect was found.
     pub found: bool,
+    /// The effect that it was found under, where that is another account of the same force.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub under: Option<String>,
 }
 
 /// Which parameter.
@@ -29,11 +32,17 @@ pub struct Key {
 }
 
 impl Key {
-    /// Whether a row is that of this parameter.
+    /// Whether a row is that of this parameter, or of the same one in another account of its force.
     pub fn is(&self, row: &Row) -> bool {
-        (&self.kind, &self.parameter, &self.joint, self.component)
-            == (&row.kind, &row.parameter, &row.joint, row.component)
+        (self.kind == row.kind || one_force(&self.kind, &row.kind))
+            && (&self.parameter, &self.joint, self.component) == (&row.parameter, &row.joint, row.component)
     }
+}
+
+/// Whether two kinds account for the same force, of which a joint has one account.
+fn one_force(a: &str, b: &str) -> bool {
+    let force = |name: &str| Kind::named(name).and_then(|kind| kind.card().force);
+    force(a).is_some() && force(a) == force(b)
 }
 
 /// What a file holds.
@@ -121,7 +130,7 @@ fn of_diagnosis(diagnosis: Diagnosis) -> Results {
                     let (kind, parameter) = (effect.kind.clone(), parameter.clone());
                     let key = Key { kind, parameter, joint: joint.clone(), component };
                     let half = Some(0.5 * (high - low));
-                    numbers.push((key, Told { value, half, found: true }, one.unit.clone()));
+                    numbers.push((key, Told { value, half, found: true, under: None }, one.unit.clone()));
                 }
             }
         }
@@ -141,7 +150,11 @@ fn of_corrected(corrected: &Corrected) -> Results {
                     joint: value.joint.clone().or_else(|| of_link.clone()),
                     component: (value.value.len() > 1).then_some(i),
                 };
-                numbers.push((key, Told { value: *number, half: None, found: true }, value.unit.to_owned()));
+                numbers.push((
+                    key,
+                    Told { value: *number, half: None, found: true, under: None },
+                    value.unit.to_owned(),
+                ));
             }
         }
     }
@@ -162,10 +175,19 @@ impl Results {
         self.numbers.iter().map(|(key, _, unit)| (key.clone(), unit.clone()))
     }
 
-    /// What is told of a parameter. One that was not found changes nothing, to within what the logs would have revealed.
+    /// What is told of a parameter. One that was not found changes nothing, to within what the logs would have revealed: but
+    /// for one whose force another effect accounts for.
     pub fn told(&self, key: &Key) -> Option<Told> {
         if let Some((_, told, _)) = self.numbers.iter().find(|(own, ..)| own == key) {
             return Some(told.clone());
+        }
+        let instead = |own: &Key| own.joint == key.joint && one_force(&own.kind, &key.kind);
+        let same = |own: &Key| (&own.parameter, own.component) == (&key.parameter, key.component);
+        if let Some((own, told, _)) = self.numbers.iter().find(|(own, ..)| instead(own) && same(own)) {
+            return Some(Told { under: Some(own.kind.clone()), ..told.clone() });
+        }
+        if self.numbers.iter().any(|(own, ..)| instead(own)) {
+            return None;
         }
         let of_joint = |power: &&Power| match &key.joint {
             Some(joint) => power.joints.contains(joint),
@@ -176,6 +198,6 @@ impl Results {
         let endless = matches!(key.kind.as_str(), "joint_elasticity" | "torque_saturation");
         let power = self.power.iter().filter(same).find(|_| key.component.is_none() && !endless)?;
         let neutral = if key.parameter == "gain" { 1.0 } else { 0.0 };
-        Some(Told { value: neutral, half: power.size, found: false })
+        Some(Told { value: neutral, half: power.size, found: false, under: None })
     }
 }

@@ -58,11 +58,16 @@ pub fn table(found: &Comparison, picture: Option<&Path>) -> String {
             let sign = if change < 0.0 { "−" } else { "+" };
             format!("{sign}{} ± {} {}", figure(change.abs()), significant(half, 2), row.unit)
         });
-        let answer = match row.answer {
+        let mut answer = match row.answer {
             Answer::Differs => format!("differs, {} errors", significant(row.apart.unwrap_or(f64::NAN), 2)),
             Answer::Common => "common".to_owned(),
             Answer::Open => "no interval".to_owned(),
         };
+        for (told, result) in row.told.iter().zip(&found.results) {
+            if let Some(under) = told.as_ref().and_then(|told| told.under.as_ref()) {
+                let _ = write!(answer, "; as {under} in {result}");
+            }
+        }
         let _ = writeln!(text, "  {}{answer}", pad(&change, 24));
     }
     if let Some(picture) = picture {

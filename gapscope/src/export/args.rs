@@ -16,7 +16,7 @@ pub struct Export {
     /// Robot description that the diagnosis was made with: URDF, xacro or MJCF
     #[arg(long, value_name = "FILE")]
     pub robot: PathBuf,
-    /// What to write, separated by commas; isaaclab needs the URDF and writes it too
+    /// What to write, separated by commas; isaaclab writes the URDF too, cpp and simulink the C file
     #[arg(long, value_enum, value_name = "TARGET", value_delimiter = ',', required_unless_present = "ranges")]
     pub to: Vec<Target>,
     /// Write a region of parameters that holds the robot with 90 %, ranges.json, and sample_ranges.py that samples it
@@ -28,10 +28,10 @@ pub struct Export {
     /// How robot and logs are read
     #[command(flatten)]
     pub reading: Reading,
-    /// Length of a step in a target that has one of its own (c), s [default: that of the residual, or 0.001]
+    /// Length of a step in a target that has one of its own (c, cpp, simulink, fmu), s [default: that of the residual, or 0.001]
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     pub dt: Option<f64>,
-    /// Residual on top of the corrected model, a folder of `gapscope train residual --with`; for the target c
+    /// Residual on top of the corrected model, a folder of `gapscope train residual --with`; for c, cpp and fmu
     #[arg(long, value_name = "DIR")]
     pub residual: Option<PathBuf>,
     /// Folder for the files of the targets and ledger.json [default: a new folder in that of the results]
@@ -53,6 +53,12 @@ pub enum Target {
     Isaaclab,
     /// One C99 file that steps the robot
     C,
+    /// A C++ header over the C file
+    Cpp,
+    /// A Simulink S-function over the C file
+    Simulink,
+    /// A co-simulation unit, FMI 2.0, with a binary where there is a C compiler
+    Fmu,
 }
 
 impl From<Target> for gapscope_export::Target {
@@ -62,6 +68,9 @@ impl From<Target> for gapscope_export::Target {
             Target::Mjcf => gapscope_export::Target::Mjcf,
             Target::Isaaclab => gapscope_export::Target::IsaacLab,
             Target::C => gapscope_export::Target::C,
+            Target::Cpp => gapscope_export::Target::Cpp,
+            Target::Simulink => gapscope_export::Target::Simulink,
+            Target::Fmu => gapscope_export::Target::Fmu,
         }
     }
 }

@@ -13,8 +13,9 @@ robot along their last.
 from ._commands import evaluate, generate, inspect, rollout
 from ._diagnosis import Diagnosis, FoundEffect, diagnose
 from ._effects import Effects
+from ._evidence import Evidence
 from ._native import Error, LogError, Model, RobotError, __version__
-from ._residual import Residual
+from ._residual import Pure, Residual
 from ._results import Evaluation, Exported, Generated, Inspection, Rollouts
 
 __all__ = [
@@ -22,12 +23,14 @@ __all__ = [
     "Effects",
     "Error",
     "Evaluation",
+    "Evidence",
     "Exported",
     "FoundEffect",
     "Generated",
     "Inspection",
     "LogError",
     "Model",
+    "Pure",
     "Residual",
     "RobotError",
     "Rollouts",

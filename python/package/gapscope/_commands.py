@@ -17,7 +17,7 @@ from ._results import Evaluation, Generated, Inspection, Rollouts
 
 if TYPE_CHECKING:
     from ._diagnosis import Diagnosis
-    from ._residual import Residual
+    from ._residual import Pure, Residual
 
     Corrections = Union[Diagnosis, str, os.PathLike[str], None]
 
@@ -64,7 +64,7 @@ def rollout(
     corrections: "Corrections" = None,
     *,
     residual: Union[Residual, str, "os.PathLike[str]", None] = None,
-    pure: Union[str, "os.PathLike[str]", None] = None,
+    pure: Union[Pure, str, "os.PathLike[str]", None] = None,
     horizon: float = 1.0,
     tolerance: float = 0.05,
     fit_start: Optional[float] = None,
@@ -77,7 +77,7 @@ def rollout(
         model, logs, options: as those of `diagnose`.
         corrections: a `Diagnosis`, or the path of a `corrected.json`.
         residual: a `Residual`, or the folder of one, on the robot's own model.
-        pure: folder of a network alone, as `gapscope train pure` leaves it.
+        pure: a `Pure`, or the folder of one.
         horizon: the longest one, s.
         tolerance: position error over all joints at which a rollout has left the log, rad or m.
         fit_start: seconds of the log to which each start is fitted; for noisy logs.
@@ -88,12 +88,13 @@ def rollout(
     """
     with ExitStack() as stack:
         arguments = stack.enter_context(given(model, logs, options))
-        if residual is not None and not isinstance(residual, (str, os.PathLike)):
-            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="gapscope-")), "residual")
-            residual.save(folder)
-            residual = folder
+        networks: dict[str, Any] = {"residual": residual, "pure": pure}
+        for kind, network in networks.items():
+            if network is not None and not isinstance(network, (str, os.PathLike)):
+                networks[kind] = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="gapscope-")), kind)
+                network.save(networks[kind])
         numbers = _flags(horizon=horizon, tolerance=tolerance, fit_start=fit_start, starts=starts)
-        flags = _with(stack, corrections) + _flags(residual=residual, pure=pure) + numbers
+        flags = _with(stack, corrections) + _flags(**networks) + numbers
         models, text, page, notes = _native.rollout(arguments, flags)
         return Rollouts(models, page, notes, text)
 

@@ -15,8 +15,7 @@ from ._commands import _flags
 from ._effects import Effects
 from ._given import Logs, Robot, given, robot_file
 from ._progress import Progress, clear, teller
-from ._residual import save
-from ._results import Exported, framed
+from ._results import Exported, framed, save
 
 if TYPE_CHECKING:
     from ._plot import Plots
@@ -202,18 +201,26 @@ class Diagnosis:
         """The bytes of diagnosis.json."""
         return self.files["diagnosis.json"]
 
-    def export(self, target: str, logs: Optional[Logs] = None, **options: Any) -> Exported:
-        """The corrected model for `"mjcf"`, `"urdf"` or `"isaaclab"`, with a ledger of what stands there and as what.
+    def export(
+        self, target: str, logs: Optional[Logs] = None, *, dt: Optional[float] = None, **options: Any
+    ) -> Exported:
+        """The corrected model for a target, with a ledger of what stands there and as what.
 
         With `logs`, best ones that the diagnosis did not see, the ledger predicts by how much the shrink falls for what the
         target cannot hold.
+
+        Args:
+            target: "urdf", "mjcf", "isaaclab", "c", "cpp", "simulink" or "fmu". "isaaclab" needs the file of "urdf" beside it,
+                "cpp" and "simulink" that of "c".
+            dt: length of a step in a target that has one of its own (the last four), s; .001 by default.
 
         Raises:
             Error: a target that the robot cannot be written for.
         """
         with self._robot.arguments([] if logs is None else logs, options) as arguments:
-            text, ledger = _native.export(target, arguments, self.joints, self.files["corrected.json"])
-        return Exported(text, json.loads(ledger))
+            corrected = self.files["corrected.json"]
+            data, name, ledger = _native.export(target, arguments, self.joints, corrected, dt)
+        return Exported(data, name, json.loads(ledger))
 
     def to_urdf(self) -> str:
         """Your own URDF with attributes edited: inertials, damping and friction, encoder zeros, a tilted base."""
@@ -238,6 +245,18 @@ class Diagnosis:
         from ._mujoco import corrected
 
         return corrected(spec, exported, partial)
+
+    def to_fmu(
+        self, path: Union[str, "os.PathLike[str]"], *, dt: Optional[float] = None, force: bool = False
+    ) -> None:
+        """Writes the corrected model as a co-simulation unit (FMI 2.0): efforts in, measured positions and speeds out.
+
+        It has a binary for this machine where there is a C compiler `cc`, and its sources in any case.
+
+        Raises:
+            Error: a file that is there already, unless `force` is given.
+        """
+        self.export("fmu", dt=dt).save(path, force=force)
 
     def save(self, folder: Union[str, "os.PathLike[str]"], *, force: bool = False) -> None:
         """Writes diagnosis.json, corrected.json, report.html and, where one is proposed, next_experiment.csv.

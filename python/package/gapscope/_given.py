@@ -59,10 +59,10 @@ def _options(options: Mapping[str, Any]) -> dict[str, Any]:
 
     known = {
         "map", "map_file", "topic", "episodes", "calibration", "xacro_args", "lock", "allow_truncated", "skip_bad_logs",
-        "as_logged",
+        "as_logged", "said",
     }  # fmt: skip
     if unknown := sorted(set(options) - known):
-        raise TypeError(f"unknown option {unknown[0]!r}; there are {', '.join(sorted(known))}")
+        raise TypeError(f"unknown option {unknown[0]!r}; there are {', '.join(sorted(known - {'said'}))}")
     columns = options.get("map") or {}
     pairs = [f"{name}={column}" for name, column in columns.items()] if isinstance(columns, Mapping) else list(columns)
     episodes = options.get("episodes")
@@ -79,6 +79,7 @@ def _options(options: Mapping[str, Any]) -> dict[str, Any]:
         "allow_truncated": bool(options.get("allow_truncated", False)),
         "skip_bad_logs": bool(options.get("skip_bad_logs", False)),
         "as_logged": bool(options.get("as_logged", False)),
+        "said": texts("said"),
     }
 
 

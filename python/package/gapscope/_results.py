@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Union
 
 from ._effects import Effects
+from ._native import Error
 
 
 class Record:
@@ -107,12 +111,49 @@ class Generated:
 class Exported:
     """A file for a simulator, and its ledger: of each effect as what it stands there and what that loses."""
 
-    text: str
+    #: Content of the file.
+    data: bytes
+    #: What the file is to be called where others refer to it.
+    name: str
     ledger: dict[str, Any]
+
+    @property
+    def text(self) -> str:
+        """Content of a file of text.
+
+        Raises:
+            UnicodeDecodeError: the file of a co-simulation unit, which is none.
+        """
+        return self.data.decode("utf-8")
+
+    def save(self, path: Union[str, "os.PathLike[str]"], *, force: bool = False) -> None:
+        """Writes the file; into a folder under its own name.
+
+        Raises:
+            Error: a file that is there already, unless `force` is given.
+        """
+        file = Path(path, self.name) if Path(path).is_dir() else Path(path)
+        save(file.parent, {file.name: self.data}, force)
 
     def __repr__(self) -> str:
         rows = [f"  {entry['kind']}: {entry['how'].replace('_', ' ')}, {entry['as']}" for entry in self.ledger["effects"]]
         return "\n".join([f"Exported for {self.ledger['target']}", *rows])
+
+
+def save(folder: Path, files: Mapping[str, Union[str, bytes]], force: bool) -> None:
+    """Writes files of a folder; none where one is there already."""
+    there = next((folder / name for name in files if (folder / name).exists()), None)
+    if there is not None and not force:
+        raise Error(f"{there} exists already; choose another folder, or allow it to be replaced with force=True")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            data = content.encode() if isinstance(content, str) else content
+            staged = folder / f".{name}.part"
+            staged.write_bytes(data)
+            staged.replace(folder / name)
+    except OSError as error:
+        raise Error(f"cannot write to {folder}: {error.strerror}") from None
 
 
 def framed(page: str, height: int = 640) -> str:

@@ -66,7 +66,10 @@ pub fn run(args: &Rollout) -> Result<String> {
     let loaded = load_any(&args.input, None, &|_| {})?;
     if servo::lacks_effort(&loaded) {
         loaded.warn();
-        return servo::rolled(args, &loaded);
+        if args.residual.is_some() || args.pure.is_some() {
+            bail!("the logs hold no torque: --residual and --pure step by it; leave them out");
+        }
+        return servo::rolled(&loaded, args.drive.as_deref(), args.with.as_deref(), (args.horizon, args.starts));
     }
     let first = args.input.logs.first().context("no log is given")?;
     let page = match &args.out {

@@ -5,7 +5,6 @@ mod summary;
 use crate::cli::{Diagnose, Evaluate};
 use crate::input::Loaded;
 use crate::report::{self, Beside};
-use crate::rollout::Rollout;
 use anyhow::{Context, Result, bail};
 use gapscope_servo::schema::Evaluation;
 use gapscope_servo::{Given, Outcome, Paths, ServoModel};
@@ -66,18 +65,20 @@ fn corrected(file: Option<&Path>, loaded: &Loaded) -> Result<Option<ServoModel>>
     Ok(Some(ServoModel::from_json(&text, &loaded.model).with_context(|| file.display().to_string())?))
 }
 
-/// Rolls a servo arm's models out under the set points of logs; returns what to print.
+/// Rolls a servo arm's models out under the set points of logs, so many starts of a horizon, s; returns what to print.
 ///
 /// # Errors
-/// A file that cannot be read or does not fit the robot or the logs; networks, which need a torque.
-pub fn rolled(args: &Rollout, loaded: &Loaded) -> Result<String> {
-    if args.residual.is_some() || args.pure.is_some() {
-        bail!("the logs hold no torque: --residual and --pure step by it; leave them out");
-    }
-    let given = given(args.drive.as_deref(), loaded)?;
-    let corrected = corrected(args.with.as_deref(), loaded)?;
+/// A file that cannot be read or does not fit the robot or the logs.
+pub fn rolled(
+    loaded: &Loaded,
+    drive: Option<&Path>,
+    with: Option<&Path>,
+    (horizon, starts): (f64, usize),
+) -> Result<String> {
+    let given = given(drive, loaded)?;
+    let corrected = corrected(with, loaded)?;
     let (model, episodes) = (&loaded.model, &loaded.episodes);
-    let growth = gapscope_servo::rollouts(model, episodes, &given, corrected.as_ref(), args.horizon, args.starts)?;
+    let growth = gapscope_servo::rollouts(model, episodes, &given, corrected.as_ref(), horizon, starts)?;
     let mut text = format!(
         "{} · rollouts under the set points, error of all joints' positions together, mrad: median (90 %)\n\n{:12}{:>10}{:>24}{:>24}\n",
         model.name(),

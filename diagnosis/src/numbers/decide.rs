@@ -59,6 +59,9 @@ pub const FILTER_KNOWN_TO: f64 = 0.15;
 /// No drive is a delay or a lag exactly: standard error, at least, of the part of their difference that is left.
 pub const LATE_KNOWN_TO: f64 = 0.15;
 
+/// Nats, at most, by which what a delay and a lag leave speaks for one of them: noise is in it, and turns the balance at best.
+pub const HINT: f64 = 1.0;
+
 /// Part of its square that noise may have of the torque by which a delay is told from a lag: a servo answers to the noise of
 /// the position, and that answer is in what is left as well.
 pub const NOISE_IN_INSTRUMENT: f64 = 0.01;

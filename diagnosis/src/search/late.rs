@@ -6,7 +6,7 @@
 //! by the model, smoothed (instrumental variables; Söderström and Stoica, Instrumental Variable Methods for System
 //! Identification, 1983).
 
-use crate::numbers::decide::{LATE_KNOWN_TO, NOISE_IN_INSTRUMENT, TWENTY_TO_ONE};
+use crate::numbers::decide::{HINT, LATE_KNOWN_TO, NOISE_IN_INSTRUMENT};
 use crate::record::data::Data;
 use crate::record::logs::{PART_OF_NOISE, Record};
 use crate::record::rows::{Rows, at_rows};
@@ -37,7 +37,7 @@ impl Record<'_> {
         let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
         let rival = chosen.with(Choice { set }, exact, fit);
         // What they leave counts as a hint: noise is in it.
-        let hint = rival.odds_against(&chosen, self)?.clamp(-TWENTY_TO_ONE, TWENTY_TO_ONE);
+        let hint = rival.odds_against(&chosen, self)?.clamp(-HINT, HINT);
         let odds = self.odds_of_the_second([&chosen, &rival])? + hint;
         let (mut likelier, lost) = if odds <= 0.0 { (chosen, other) } else { (rival, lost) };
         // What was decided here no climb turns round.

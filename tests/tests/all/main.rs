@@ -15,6 +15,7 @@ mod load;
 mod next_experiment;
 mod outside;
 mod power;
+mod pushes;
 mod real_logs;
 mod robots;
 mod rollouts;

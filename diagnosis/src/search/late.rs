@@ -6,7 +6,7 @@
 //! by the model, smoothed (instrumental variables; Söderström and Stoica, Instrumental Variable Methods for System
 //! Identification, 1983).
 
-use crate::numbers::decide::{HINT, LATE_KNOWN_TO, NOISE_IN_INSTRUMENT};
+use crate::numbers::decide::{HINT, LATE_KNOWN_TO, NOISE_IN_INSTRUMENT, SERVO_ANSWERS};
 use crate::record::data::Data;
 use crate::record::logs::{PART_OF_NOISE, Record};
 use crate::record::rows::{Rows, at_rows};
@@ -19,6 +19,13 @@ use gapscope_effects::{Candidate, EffectError};
 const SMOOTHED_BY: [f64; 5] = [0.2, 0.1, 0.05, 0.025, 0.0125];
 /// Relative step of a delay for what a little more of it would change.
 const LATER: f64 = 0.01;
+
+/// What two laws make of a torque with little noise, the first less the second, at the rows of the band.
+struct Instrument {
+    rows: Rows,
+    /// What a part of the noise of the position once more changes of that, see [`PART_OF_NOISE`].
+    noise: Rows,
+}
 
 impl Record<'_> {
     /// The choice with the likelier of delay and lag where it has one of them, and the probability that it is the other.
@@ -60,7 +67,7 @@ impl Record<'_> {
         };
         // Each joint counts by what is left of it.
         let sizes: Vec<f64> = (0..n).map(size).collect();
-        let instrument = self.instrument(accounts[0], [&first, &second], &sizes)?;
+        let Instrument { rows: instrument, noise } = self.instrument(accounts[0], [&first, &second], &sizes)?;
         let mut sums = vec![(0.0, 0.0); self.band.blocks];
         for (j, size) in sizes.iter().enumerate().filter(|(_, size)| **size > 0.0) {
             for (i, row) in self.band.rows.iter().enumerate() {
@@ -69,18 +76,29 @@ impl Record<'_> {
                 *between += instrument[j][i] * (rests[0][j][i] - rests[1][j][i]) / size;
             }
         }
-        Ok(odds_of_the_second(&sums))
+        // Noise of the position in what is left goes with that in the instrument.
+        let mut answered = f64::INFINITY;
+        for (account, rest) in accounts.iter().zip(&rests) {
+            let noisier = Data { signals: &self.noisier, ..self.data(&account.noise) };
+            let noisier = noisier.rest(&account.exact, &account.fit)?;
+            if noisier.len() == self.signals.len() {
+                let goes_along = dot(&noise, &less(&at_rows(&self.band, &noisier, n), rest), &sizes);
+                answered = answered.min(goes_along.abs() / PART_OF_NOISE.powi(2));
+            }
+        }
+        let answered = if answered.is_finite() { answered } else { 0.0 };
+        Ok(odds_of_the_second(&sums, SERVO_ANSWERS * answered))
     }
 
     /// What the first of two laws makes of the torque that the motion takes less what the second does, at the rows of the band.
     /// The torque is smoothed until noise is a small part of that. What a little more or less of the delay would change is
     /// taken out: noise shifts both laws.
-    fn instrument(&self, of: &Chosen, laws: [&Candidate; 2], sizes: &[f64]) -> Result<Rows, EffectError> {
+    fn instrument(&self, of: &Chosen, laws: [&Candidate; 2], sizes: &[f64]) -> Result<Instrument, EffectError> {
         let n = self.model.dof();
         let taken = |signals: &[Signals]| Data { signals, ..self.data(&of.noise) }.loaded(&of.exact, &of.fit);
         let (plain, noisier) = (taken(&self.signals)?, taken(&self.noisier)?);
         let later = Candidate { shape: laws[0].shape * (1.0 + LATER), ..laws[0].clone() };
-        let mut instrument = Rows::new();
+        let mut instrument = Instrument { rows: Rows::new(), noise: vec![Vec::new(); n] };
         for smoothed_by in SMOOTHED_BY {
             let rows = |signals: &[Signals], laws: [&Candidate; 2]| {
                 let of = |s: &Signals| -> Vec<Vec<f64>> {
@@ -89,10 +107,10 @@ impl Record<'_> {
                 };
                 at_rows(&self.band, &signals.iter().map(of).collect::<Vec<_>>(), n)
             };
-            let mut next = rows(&plain, laws);
-            if noisier.len() == plain.len() && !instrument.is_empty() {
-                let mut noise = rows(&noisier, laws);
-                noise.iter_mut().zip(&next).for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a -= b));
+            let known = noisier.len() == plain.len();
+            let (next, shaken) = (rows(&plain, laws), if known { rows(&noisier, laws) } else { Rows::new() });
+            if known && !instrument.rows.is_empty() {
+                let noise = less(&shaken, &next);
                 let part = dot(&noise, &noise, sizes) / dot(&next, &next, sizes) / PART_OF_NOISE.powi(2);
                 if part > NOISE_IN_INSTRUMENT {
                     break;
@@ -100,23 +118,31 @@ impl Record<'_> {
             }
             let tangent = rows(&plain, [laws[0], &later]);
             let part = dot(&next, &tangent, sizes) / dot(&tangent, &tangent, sizes).max(f64::MIN_POSITIVE);
-            next.iter_mut().zip(&tangent).for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a -= part * b));
-            instrument = next;
+            let across = |rows: &Rows, tangent: &Rows| -> Rows {
+                let row = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a - part * b).collect();
+                rows.iter().zip(tangent).map(row).collect()
+            };
+            instrument.rows = across(&next, &tangent);
+            if known {
+                let shaken = across(&shaken, &rows(&noisier, [laws[0], &later]));
+                instrument.noise = less(&shaken, &instrument.rows);
+            }
         }
         Ok(instrument)
     }
 }
 
 /// Nats for the second of two laws by blocks of time: what goes with their difference of what the first leaves, and of what
-/// the first leaves and the second does not.
-fn odds_of_the_second(blocks: &[(f64, f64)]) -> f64 {
+/// the first leaves and the second does not. Noise may have `answered` to the first of these sums.
+fn odds_of_the_second(blocks: &[(f64, f64)], answered: f64) -> f64 {
     let (left, between) = blocks.iter().fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
     if between == 0.0 {
         return 0.0;
     }
     // Part of the difference that the first leaves: 0 where it is right, 1 where the second is.
     let part = left / between;
-    let error = blocks.iter().map(|(l, b)| (l - part * b).powi(2)).sum::<f64>().sqrt() / between.abs();
+    let spread: f64 = blocks.iter().map(|(l, b)| (l - part * b).powi(2)).sum();
+    let error = (spread + answered * answered).sqrt() / between.abs();
     // What lies beyond both laws shows by how much they are off.
     let beyond = part - part.clamp(0.0, 1.0);
     (2.0 * part - 1.0) / (2.0 * error.hypot(LATE_KNOWN_TO).max(beyond.abs()).powi(2))
@@ -143,6 +169,10 @@ fn difference(torque: &[f64], laws: [&Candidate; 2], dt: f64) -> Vec<f64> {
     first.iter().zip(second).map(|(a, b)| a - b).collect()
 }
 
+fn less(a: &Rows, b: &Rows) -> Rows {
+    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect()
+}
+
 /// Sum of the products of rows, each joint by one over its size; joints without one count nothing.
 fn dot(a: &Rows, b: &Rows, sizes: &[f64]) -> f64 {
     let of = |((a, b), size): ((&Vec<f64>, &Vec<f64>), &f64)| {
@@ -160,15 +190,17 @@ mod tests {
         let blocks = |part: f64| -> Vec<(f64, f64)> {
             (0..20).map(|i| (part + 0.1 * f64::from(2 * (i % 2) - 1), 1.0)).collect()
         };
-        let odds = |part: f64| odds_of_the_second(&blocks(part));
+        let odds = |part: f64| odds_of_the_second(&blocks(part), 0.0);
         assert!(odds(0.0) < -15.0 && odds(1.0) > 15.0, "{} {}", odds(0.0), odds(1.0));
         assert!(odds(0.5).abs() < 1e-9, "half of the difference is neither");
         // Twice the difference is beyond both laws, and so may be what lies between them.
         assert!(odds(2.0) > 0.0 && odds(2.0) < odds(1.0), "{}", odds(2.0));
-        assert_eq!(odds_of_the_second(&[(1.0, 0.0); 5]), 0.0);
+        assert_eq!(odds_of_the_second(&[(1.0, 0.0); 5], 0.0), 0.0);
+        // What a servo's answer to noise might have done is no evidence.
+        assert!(odds_of_the_second(&blocks(0.0), 20.0) > -0.6);
         // Blocks that do not agree say little.
         let split: Vec<(f64, f64)> = (0..20).map(|i| (if i % 2 == 0 { 4.0 } else { -4.0 }, 1.0)).collect();
-        assert!(odds_of_the_second(&split).abs() < 1.0);
+        assert!(odds_of_the_second(&split, 0.0).abs() < 1.0);
     }
 
     #[test]

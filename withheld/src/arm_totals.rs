@@ -1,7 +1,7 @@
 //! Figures over used arms.
 
+use crate::case_score::CaseScore;
 use crate::curves::{calibration, expected_error};
-use crate::score::CaseScore;
 use crate::statistics::{mean, mean_rounded, median, rounded, share_interval};
 use crate::truth::{Group, Used, is_unknown};
 use gapscope_effects::Kind;

@@ -1,6 +1,6 @@
 //! How often an answer is right, by what it says itself and by what there was to see.
 
-use crate::score::{CaseScore, counted};
+use crate::case_score::{CaseScore, counted};
 use crate::statistics::{mean, rounded, share_interval};
 use crate::truth::is_unknown;
 use serde::Serialize;

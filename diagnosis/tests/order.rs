@@ -11,7 +11,7 @@ const STOREYS: [&str; 8] = ["schema", "numbers", "record", "fit", "search", "ans
 const LINES: usize = 400;
 
 /// Crates with circles that are still to be opened, and the files in them.
-const OPEN: [(&str, usize); 5] = [("dynamics", 10), ("gapscope", 5), ("network", 3), ("servo", 2), ("withheld", 4)];
+const OPEN: [(&str, usize); 5] = [("dynamics", 10), ("gapscope", 5), ("network", 3), ("servo", 6), ("withheld", 4)];
 
 /// The files of a crate by module path, without comments and tests.
 struct Crate(BTreeMap<String, String>);

@@ -54,7 +54,15 @@ def run(name, folder, data, monkeypatch):
     client.execute()
 
 
-@pytest.mark.parametrize("name", sorted(HOLDS))
+#: What fails today, and why.
+FAILS = {"servo_arm": "dry friction of a stiff servo that carries nothing is taken for friction under load: issue 26"}
+
+
+def marked(name):
+    return pytest.param(name, marks=pytest.mark.xfail(reason=FAILS[name])) if name in FAILS else name
+
+
+@pytest.mark.parametrize("name", [marked(name) for name in sorted(HOLDS)])
 def test_a_notebook_runs_on_simulated_logs(name, tmp_path, monkeypatch):
     run(name, tmp_path, tmp_path / "none", monkeypatch)
 

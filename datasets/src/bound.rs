@@ -5,7 +5,6 @@ use crate::options::Bound;
 use crate::time_stamps::LONGEST_STEP;
 use gapscope_dynamics::Finding;
 use std::collections::BTreeMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Runs longer than this are cut into stretches of about this length where they do not all fit, s. Motions that excite a robot
 /// last some ten seconds.
@@ -83,7 +82,7 @@ impl Keeper {
     /// Takes in a run of a file, unless the same samples were read before.
     pub fn add(&mut self, file: usize, episode: Episode) {
         let place = (file, self.seen.values().filter(|((of, _), _)| *of == file).count());
-        if self.is_new(samples(&episode), place, &episode.name) {
+        if self.is_new(episode.motion_digest(), place, &episode.name) {
             self.all = self.all.plus(Size::of(&episode), 1.0);
             self.take(place, episode);
         }
@@ -214,15 +213,6 @@ fn seconds(episode: &Episode) -> f64 {
 /// The bits of a number reversed, as a fraction: 0, 1/2, 1/4, 3/4, …. Those of the lowest ranks are spread evenly.
 fn reversed(number: u64) -> f64 {
     number.reverse_bits() as f64 / 2f64.powi(64)
-}
-
-/// A digest of the samples of time and position.
-fn samples(episode: &Episode) -> u64 {
-    let mut digest = DefaultHasher::new();
-    for row in std::iter::once(&episode.time).chain(&episode.position) {
-        row.iter().for_each(|x| x.to_bits().hash(&mut digest));
-    }
-    digest.finish()
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! One continuous run of one robot.
 
 use crate::robust::median;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A quantity that a log carries for each joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -117,6 +118,15 @@ pub struct Episode {
 }
 
 impl Episode {
+    /// A digest of the samples of time and position: the same log under another name has the same.
+    pub fn motion_digest(&self) -> u64 {
+        let mut digest = DefaultHasher::new();
+        for row in std::iter::once(&self.time).chain(&self.position) {
+            row.iter().for_each(|x| x.to_bits().hash(&mut digest));
+        }
+        digest.finish()
+    }
+
     /// Number of samples T.
     pub fn len(&self) -> usize {
         self.time.len()

@@ -10,7 +10,6 @@ use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, Kind};
 use nalgebra::{DMatrix, DVector};
-use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Parts of one in which sums are counted: fine beside any noise, and 2⁶³ fits.
 const UNIT: f64 = 18_446_744_073_709_551_616.0;
@@ -93,7 +92,7 @@ impl Sums {
         self.merge(&one)?;
         let samples = |j: usize| signals[0].slides(j, still[j]).into_iter().filter(|slides| *slides).count();
         let seconds = signals[0].dt * (0..model.dof()).map(samples).sum::<usize>() as f64;
-        let digest = digest(episode);
+        let digest = episode.motion_digest();
         let uniform = (digest as f64 + 0.5) / UNIT;
         Ok(Place { rank: -uniform.ln() / seconds, digest })
     }
@@ -298,15 +297,6 @@ fn of_joints() -> impl Iterator<Item = Kind> {
 fn bodies(joints: usize) -> impl Iterator<Item = Candidate> {
     let kind = Kind::ALL.into_iter().find(|kind| kind.is_calibration() && kind.card().body);
     kind.into_iter().flat_map(move |kind| (0..joints).map(move |j| Candidate::new(kind, vec![j])))
-}
-
-/// A digest of the samples of time and position.
-fn digest(episode: &Episode) -> u64 {
-    let mut digest = DefaultHasher::new();
-    for row in std::iter::once(&episode.time).chain(&episode.position) {
-        row.iter().for_each(|x| x.to_bits().hash(&mut digest));
-    }
-    digest.finish()
 }
 
 #[cfg(test)]

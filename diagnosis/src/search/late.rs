@@ -13,6 +13,7 @@ use crate::record::rows::{Rows, at_rows};
 use crate::record::signals::Signals;
 use crate::search::chosen::Chosen;
 use crate::search::climb::Choice;
+use crate::search::noise::less;
 use gapscope_effects::{Candidate, EffectError};
 
 /// Time constants of the lags that the torque may be smoothed by, once each way, s.
@@ -77,16 +78,16 @@ impl Record<'_> {
             }
         }
         // Noise of the position in what is left goes with that in the instrument.
-        let mut answered = f64::INFINITY;
-        for (account, rest) in accounts.iter().zip(&rests) {
-            let noisier = Data { signals: &self.noisier, ..self.data(&account.noise) };
-            let noisier = noisier.rest(&account.exact, &account.fit)?;
-            if noisier.len() == self.signals.len() {
-                let goes_along = dot(&noise, &less(&at_rows(&self.band, &noisier, n), rest), &sizes);
-                answered = answered.min(goes_along.abs() / PART_OF_NOISE.powi(2));
-            }
-        }
-        let answered = if answered.is_finite() { answered } else { 0.0 };
+        let goes_along = |i: usize| {
+            let data = Data { signals: &self.noisier, ..self.data(&accounts[i].noise) };
+            let noisier = at_rows(&self.band, &data.rest(&accounts[i].exact, &accounts[i].fit)?, n);
+            Ok::<_, EffectError>(dot(&noise, &less_rows(&noisier, &rests[i]), &sizes).abs())
+        };
+        let answered = if self.noisier.len() == self.signals.len() {
+            goes_along(0)?.min(goes_along(1)?) / PART_OF_NOISE.powi(2)
+        } else {
+            0.0
+        };
         Ok(odds_of_the_second(&sums, SERVO_ANSWERS * answered))
     }
 
@@ -110,7 +111,7 @@ impl Record<'_> {
             let known = noisier.len() == plain.len();
             let (next, shaken) = (rows(&plain, laws), if known { rows(&noisier, laws) } else { Rows::new() });
             if known && !instrument.rows.is_empty() {
-                let noise = less(&shaken, &next);
+                let noise = less_rows(&shaken, &next);
                 let part = dot(&noise, &noise, sizes) / dot(&next, &next, sizes) / PART_OF_NOISE.powi(2);
                 if part > NOISE_IN_INSTRUMENT {
                     break;
@@ -125,7 +126,7 @@ impl Record<'_> {
             instrument.rows = across(&next, &tangent);
             if known {
                 let shaken = across(&shaken, &rows(&noisier, [laws[0], &later]));
-                instrument.noise = less(&shaken, &instrument.rows);
+                instrument.noise = less_rows(&shaken, &instrument.rows);
             }
         }
         Ok(instrument)
@@ -166,11 +167,12 @@ fn smoothed(torque: &[f64], time: f64, dt: f64) -> Vec<f64> {
 /// What the first of two laws makes of a torque less what the second does.
 fn difference(torque: &[f64], laws: [&Candidate; 2], dt: f64) -> Vec<f64> {
     let [first, second] = laws.map(|law| law.passed_on(torque, dt));
-    first.iter().zip(second).map(|(a, b)| a - b).collect()
+    less(&first, &second)
 }
 
-fn less(a: &Rows, b: &Rows) -> Rows {
-    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect()
+/// Differences of rows, joint by joint.
+fn less_rows(a: &Rows, b: &Rows) -> Rows {
+    a.iter().zip(b).map(|(a, b)| less(a, b)).collect()
 }
 
 /// Sum of the products of rows, each joint by one over its size; joints without one count nothing.

@@ -23,6 +23,37 @@ const FELT: f64 = 0.05;
 /// Rows to either side over which that is looked at.
 const NEAR: usize = 1;
 
+/// Logarithms of sizes in a band of frequencies, of an account and of the one that it is held against.
+struct Levels {
+    /// What each leaves.
+    left: [f64; 2],
+    /// What each makes of all noise.
+    moved: [f64; 2],
+    /// What each makes of the noise of the position.
+    position: [f64; 2],
+}
+
+impl Levels {
+    /// The factor that brings what the account leaves to the noise that both have; `filters` says which has a law that the other
+    /// has not.
+    fn factor(&self, filters: [bool; 2]) -> f64 {
+        let more = self.moved[0] - self.moved[1];
+        // Two runs of a play that hits its stops at other times differ by more than either leaves: that is no noise.
+        let most = self.left[0].max(self.left[1]);
+        let bounded = self.moved[0].min(most) - self.moved[1].min(most);
+        // In doubt for the account without the law.
+        let (more, doubt) = match filters {
+            [true, false] => (bounded.min(more), 0.0),
+            [false, true] => (bounded.max(more), bounded.max(more).abs().min(FILTER_KNOWN_TO)),
+            _ => (bounded, 0.0),
+        };
+        // The noise of the position is known. What leaves less than it must is no better for that: a light link that jumps in a
+        // gap takes the noise for its motion.
+        let least = self.position[0].min(self.position[1]) - self.left[0];
+        ((-more).min(0.0) - doubt).max(least).exp()
+    }
+}
+
 impl Record<'_> {
     /// What brings the residuals of two accounts, each with what it leaves of every run, to one noise. Noise of the position is
     /// white. Noise of the effort is as what is left by the account that leaves more, played backwards: the same spectrum,
@@ -55,29 +86,21 @@ impl Record<'_> {
             Ok((0..n).map(|j| self.levels(&less(&noisier[j], &plain[i][j]))).collect())
         };
         let moved = [moved(0)?, moved(1)?];
-        let left = [0, 1].map(|i: usize| plain[i].iter().map(|rows| self.levels(rows)).collect::<Vec<_>>());
+        let levels = |of: &dyn Fn(usize, usize) -> Vec<f64>| {
+            [0, 1].map(|i| (0..n).map(|j| self.levels(&of(i, j))).collect::<Vec<_>>())
+        };
+        let left = levels(&|i, j| plain[i][j].clone());
+        let position = levels(&|i, j| less(&of_position[i][j], &plain[i][j]));
         let filters = [0, 1].map(|i: usize| accounts[i].0.filters_beyond(accounts[1 - i].0));
         let scale = |i: usize| {
-            let of = |j: usize| {
-                let from_position = [0, 1].map(|i: usize| self.levels(&less(&of_position[i][j], &plain[i][j])));
-                std::array::from_fn(|b| {
-                    let more = moved[i][j][b] - moved[1 - i][j][b];
-                    // Two runs of a play that hits its stops at other times differ by more than either leaves: that is no noise.
-                    let most = left[0][j][b].max(left[1][j][b]) + PART_OF_NOISE.ln();
-                    let bounded = moved[i][j][b].min(most) - moved[1 - i][j][b].min(most);
-                    // In doubt for the account without the law.
-                    let (more, doubt) = match [filters[i], filters[1 - i]] {
-                        [true, false] => (bounded.min(more), 0.0),
-                        [false, true] => (bounded.max(more), bounded.max(more).abs().min(FILTER_KNOWN_TO)),
-                        _ => (bounded, 0.0),
-                    };
-                    // The noise of the position is known. What leaves less than it must is no better for that: a light link that
-                    // jumps in a gap takes the noise for its motion.
-                    let bound = from_position[0][b].min(from_position[1][b]) - PART_OF_NOISE.ln();
-                    ((-more).min(0.0) - doubt).max(bound - left[i][j][b]).exp()
-                })
+            let both = |of: &[Vec<[f64; BANDS]>; 2], j: usize, b: usize| [of[i][j][b], of[1 - i][j][b]];
+            let at = |j: usize, b: usize| Levels {
+                left: both(&left, j, b),
+                moved: both(&moved, j, b).map(|level| level - PART_OF_NOISE.ln()),
+                position: both(&position, j, b).map(|level| level - PART_OF_NOISE.ln()),
             };
-            Equalizer((0..n).map(of).collect())
+            let filters = [filters[i], filters[1 - i]];
+            Equalizer((0..n).map(|j| std::array::from_fn(|b| at(j, b).factor(filters))).collect())
         };
         Ok([scale(0), scale(1)])
     }
@@ -135,7 +158,8 @@ impl Record<'_> {
     }
 }
 
-fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
+/// Differences, row by row.
+pub(super) fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
@@ -153,6 +177,35 @@ fn size(x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The factor of an account by what it and the other leave and make of noise; the noise of the position is too small to tell.
+    fn factor(left: [f64; 2], moved: [f64; 2], filters: [bool; 2]) -> f64 {
+        let (left, moved) = (left.map(f64::ln), moved.map(f64::ln));
+        Levels { left, moved, position: [-20.0; 2] }.factor(filters)
+    }
+
+    #[test]
+    fn an_account_is_scaled_down_to_what_the_other_makes_of_noise() {
+        assert!((factor([2.0, 1.0], [2.0, 1.0], [true, true]) - 0.5).abs() < 1e-9);
+        assert_eq!(factor([1.0, 2.0], [1.0, 2.0], [true, true]), 1.0, "and never up");
+        // A rigid drive beside a spring that filters noise, both louder than they leave: in doubt it is nearer still.
+        let rigid = factor([1.0, 0.7], [1.4, 1.0], [false, true]);
+        assert!((rigid - (-FILTER_KNOWN_TO).exp() / 1.4).abs() < 1e-9, "{rigid}");
+    }
+
+    #[test]
+    fn two_runs_of_a_play_that_differ_by_more_than_is_left_do_not_speak_for_it() {
+        let play = factor([1.0, 1.0], [9.0, 1.0], [true, false]);
+        assert_eq!(play, 1.0, "{play}");
+    }
+
+    #[test]
+    fn no_account_leaves_less_than_the_known_noise_of_the_position() {
+        let at =
+            |left: f64| Levels { left: [left.ln(), 0.0], moved: [0.0; 2], position: [0.3, 0.0] }.factor([true, false]);
+        assert!((at(0.5) - 2.0).abs() < 1e-9, "half of the lesser noise: {}", at(0.5));
+        assert_eq!(at(2.0), 1.0);
+    }
 
     #[test]
     fn the_size_of_noise_is_told_beside_outliers_and_rests() {

@@ -80,7 +80,7 @@ impl Coupling {
 }
 
 /// Torque through a coupling at an angle and its rate. No path through it is longer than another, so that several go side by side.
-#[inline]
+#[inline(always)]
 fn passed(stiffness: f64, damping: f64, half_gap: f64, delta: f64, rate: f64) -> f64 {
     let pressed = (delta.abs() - half_gap).max(0.0).copysign(delta);
     let torque = stiffness * pressed + damping * rate;

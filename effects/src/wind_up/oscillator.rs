@@ -1,6 +1,7 @@
 //! An inertia on a coupling along a run; several are followed side by side.
 
 use super::{Coupling, Drag, SLOPE_OVER, WindUp, dot, passed};
+use multiversion::multiversion;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
 
@@ -23,8 +24,8 @@ const BEYOND_DOUBT: f64 = 0.25;
 /// A coupling that is so soft, under a link that falls, that it runs away begins anew from here, rad (m).
 const LET_GO: f64 = 100.0;
 
-/// Oscillators that are followed side by side.
-const LANES: usize = 8;
+/// Oscillators that are followed side by side: a step waits for the one before, so that the processor has time for so many.
+const LANES: usize = 32;
 
 /// An inertia on a coupling along a run: I δ̈ = drive + f(q̇_m − δ̇) − slope δ − τ_l(δ, δ̇).
 ///
@@ -156,6 +157,8 @@ pub(super) fn follow(all: &[Begun<'_>]) -> Vec<WindUp> {
         1 => padded::<1>(some),
         2 => padded::<2>(some),
         3 | 4 => padded::<4>(some),
+        5..=8 => padded::<8>(some),
+        9..=16 => padded::<16>(some),
         _ => padded::<LANES>(some),
     };
     all.chunks(LANES).flat_map(some).collect()
@@ -170,6 +173,7 @@ fn padded<const L: usize>(all: &[Begun<'_>]) -> Vec<WindUp> {
 }
 
 /// Semi-implicit Euler in steps of half a millisecond.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+avx2+fma", "x86_64+avx2+fma"))]
 fn together<const L: usize>(all: &[Begun<'_>; L]) -> [WindUp; L] {
     let samples = all.iter().map(|(own, ..)| own.drive.len()).max().unwrap_or(0);
     let longest = all.iter().map(|(own, ..)| own.dt).fold(0.0, f64::max);
@@ -182,6 +186,7 @@ fn together<const L: usize>(all: &[Begun<'_>; L]) -> [WindUp; L] {
     });
     let h: [f64; L] = std::array::from_fn(|l| all[l].0.dt / steps);
     let stiffness: [f64; L] = std::array::from_fn(|l| all[l].0.coupling.stiffness);
+    let (compliance, steps_per_second) = (stiffness.map(f64::recip), h.map(f64::recip));
     let damping: [f64; L] = std::array::from_fn(|l| all[l].0.coupling.damping);
     let half_gap: [f64; L] = std::array::from_fn(|l| all[l].0.coupling.half_gap);
     let shown_from: [f64; L] = std::array::from_fn(|l| all[l].0.coupling.shown_from());
@@ -239,11 +244,11 @@ fn together<const L: usize>(all: &[Begun<'_>; L]) -> [WindUp; L] {
             if sees {
                 for l in 0..L {
                     let torque = at.seen[l] + at.seen_rises[l] * part;
-                    let wound = torque / stiffness[l] + half_gap[l].copysign(torque);
+                    let wound = torque * compliance[l] + half_gap[l].copysign(torque);
                     let inside = angle[l].max(-half_gap[l]).min(half_gap[l]);
                     let held = if torque.abs() > shown_from[l] { wound } else { inside };
                     let off = at.pull[l] * (held - angle[l]);
-                    drawn[l] = off / h[l];
+                    drawn[l] = off * steps_per_second[l];
                     angle[l] += off;
                 }
             }

@@ -53,8 +53,8 @@ impl Study<'_> {
     }
 
     pub(super) fn rigid_in(&self, view: View) -> Rigid {
-        let account = Candidate::rotor(self.joint);
-        let (rest, noise) = self.rows_and_noise(&account, self.rotor, view);
+        let rigid = [(Candidate::rotor(self.joint), self.rotor)];
+        let (rest, noise) = self.rows_and_noise(&rigid, view).next().unwrap_or_default();
         let seen: Vec<f64> = noise.iter().copied().filter(|noise| *noise > 0.0).collect();
         let nothing = BLOCK_OF_NOISE * mean(&seen) + self.unnoticed;
         let mut rigid = Rigid { noise, nothing, left: Vec::new() };
@@ -73,8 +73,12 @@ impl Study<'_> {
     pub(super) fn turn(&self, drive: Candidate, rotor: f64) -> (Candidate, f64) {
         let view = self.view(&drive, rotor);
         let rigid = self.against(&drive, rotor);
-        let level = |drive: &Candidate, rotor: f64| mean_logarithm(self.left_in(drive, rotor, &rigid, view));
-        let mut best = (level(&drive, rotor), drive, rotor);
+        let levels = |tries: &[(Candidate, f64)]| -> Vec<f64> {
+            let left = self.left_in_each(tries, &rigid, view);
+            left.iter().map(mean_logarithm).collect()
+        };
+        let first = vec![(drive, rotor)];
+        let mut best = (levels(&first)[0], first[0].0.clone(), rotor);
         let mut step = STEPS.0;
         for _ in 0..MOVES {
             if step < STEPS.1 {
@@ -84,12 +88,13 @@ impl Study<'_> {
             if best.1.shape > 0.0 {
                 tries.extend([(1.0 + step, 1.0), (1.0 / (1.0 + step), 1.0)]);
             }
-            let next = tries
+            let tries: Vec<(Candidate, f64)> = tries
                 .into_iter()
                 .map(|(knob, by)| (Candidate { shape: knob * best.1.shape, ..best.1.clone() }, by * best.2))
                 .filter(|(_, rotor)| *rotor >= LIGHTEST_ROTOR * self.inertia)
-                .map(|(drive, rotor)| (level(&drive, rotor), drive, rotor))
-                .find(|next| next.0 < best.0);
+                .collect();
+            let next = levels(&tries).into_iter().zip(tries).map(|(level, (drive, rotor))| (level, drive, rotor));
+            let next = next.into_iter().find(|next| next.0 < best.0);
             match next {
                 Some(next) => best = next,
                 None => step /= 2.0,
@@ -126,13 +131,17 @@ impl Study<'_> {
 
     /// Mean square of each block that a drive leaves beyond noise and nothing, (N m)².
     pub(super) fn left(&self, drive: &Candidate, rotor: f64, rigid: &Rigid) -> Vec<f64> {
-        self.left_in(drive, rotor, rigid, self.view(drive, rotor))
+        let one = [(drive.clone(), rotor)];
+        self.left_in_each(&one, rigid, self.view(drive, rotor)).pop().unwrap_or_default()
     }
 
-    pub(super) fn left_in(&self, drive: &Candidate, rotor: f64, rigid: &Rigid, view: View) -> Vec<f64> {
-        let (rest, noise) = self.rows_and_noise(drive, rotor, view);
-        let noise = taken_off(&noise, rigid, view);
-        self.beyond(rest, &noise, rigid.nothing)
+    /// The same of several drives with their rotors, in one view.
+    pub(super) fn left_in_each(&self, tries: &[(Candidate, f64)], rigid: &Rigid, view: View) -> Vec<Vec<f64>> {
+        let left = |(rest, noise): (Vec<f64>, Vec<f64>)| {
+            let noise = taken_off(&noise, rigid, view);
+            self.beyond(rest, &noise, rigid.nothing)
+        };
+        self.rows_and_noise(tries, view).map(left).collect()
     }
 
     pub(super) fn beyond(&self, rest: Vec<f64>, noise: &[f64], nothing: f64) -> Vec<f64> {
@@ -140,13 +149,21 @@ impl Study<'_> {
         left.map(|(left, noise)| (left - noise).max(0.0) + nothing).collect()
     }
 
-    /// What a drive leaves at the rows of the band, and the mean square of what more noise changes of that in each block, (N m)².
-    pub(super) fn rows_and_noise(&self, drive: &Candidate, rotor: f64, view: View) -> (Vec<f64>, Vec<f64>) {
-        let asked = [Runs::Logged, Runs::Noisier].map(|of| (of, drive, rotor));
-        let mut both = self.rows_each(&asked, view).into_iter();
-        let (rest, noisier) = (both.next().unwrap_or_default(), both.next().unwrap_or_default());
-        let noise = self.mean_squares(noisier.iter().zip(&rest).map(|(noisier, rest)| noisier - rest).collect());
-        (rest, noise)
+    /// What each of some drives leaves at the rows of the band, and the mean square of what more noise changes of that in each
+    /// block, (N m)².
+    pub(super) fn rows_and_noise(
+        &self,
+        tries: &[(Candidate, f64)],
+        view: View,
+    ) -> impl Iterator<Item = (Vec<f64>, Vec<f64>)> {
+        let with_noise = |(drive, rotor)| [Runs::Logged, Runs::Noisier].map(|of| (of, drive, rotor));
+        let asked: Vec<(Runs, &Candidate, f64)> = tries.iter().map(|(d, r)| (d, *r)).flat_map(with_noise).collect();
+        let mut rows = self.rows_each(&asked, view).into_iter();
+        std::iter::from_fn(move || {
+            let (rest, noisier) = (rows.next()?, rows.next()?);
+            let noise = self.mean_squares(noisier.iter().zip(&rest).map(|(noisier, rest)| noisier - rest).collect());
+            Some((rest, noise))
+        })
     }
 
     /// Of every block that has rows.

@@ -4,7 +4,9 @@ use crate::{common, support};
 
 use common::robot;
 use gapscope_dynamics::{Data, Model};
-use gapscope_effects::{Candidate, Effect, EncoderSide, Kind, LoadDependentFriction, Motion, Plant, Range};
+use gapscope_effects::{
+    Candidate, CoulombFriction, Effect, EncoderSide, Kind, LoadDependentFriction, Motion, Plant, Range,
+};
 use support::motion;
 
 const DT: f64 = 0.002;
@@ -213,4 +215,27 @@ fn friction_under_the_load_of_a_noisy_effort_goes_by_its_mean_size() {
     };
     assert!(left(&[noise]).abs() < 1e-4, "{}", left(&[noise]));
     assert!(left(&[]).abs() > 0.05, "{}", left(&[]));
+}
+
+/// What friction holds at rest is told from the mean of what is needed: the noise of an encoder's acceleration exceeds it by far.
+#[test]
+fn a_joint_that_slips_at_its_greatest_friction_leaves_the_noise_of_its_acceleration_and_not_its_mean_size() {
+    let (inertia, friction, samples) = (0.2, 1.0, 400);
+    let model = support::hinge(inertia);
+    let of = |x: f64| vec![vec![x; samples]];
+    let noise = vec![(0..samples).map(|k| if k % 2 == 0 { 20.0 } else { -20.0 }).collect::<Vec<f64>>()];
+    let mean_left = |effort: f64| {
+        let (q, v, tau) = (of(0.0), of(0.5 * STILL), of(effort));
+        let still = [STILL];
+        let motion = motion(&model, [&q, &v, &noise, &tau, &tau], DT, &still);
+        let coulomb = std::iter::once(("joint1".to_owned(), friction)).collect();
+        let effects = [Effect::CoulombFriction(CoulombFriction { coulomb })];
+        let left = &Plant::new(&model, &effects, DT).unwrap().residuals(&motion)[0];
+        // Away from the ends, where the mean is of fewer samples.
+        let inner = &left[100..samples - 100];
+        inner.iter().sum::<f64>() / inner.len() as f64
+    };
+    assert!((mean_left(1.25) - 0.25).abs() < 1e-9, "{}", mean_left(1.25));
+    assert!((mean_left(-1.25) + 0.25).abs() < 1e-9, "{}", mean_left(-1.25));
+    assert_eq!(mean_left(0.8), 0.0, "it holds");
 }

@@ -35,9 +35,9 @@ pub struct Card {
     pub exact_to_samples: f64,
     /// Whether its torque bends with its own parameters or with those of others.
     pub bends: bool,
-    /// Whether its columns rest on what else was found: the torque that loads the gears or that the motion takes, or the gain
-    /// and bias of a drive.
-    pub reads_torque: bool,
+    /// Whether its columns hang on what else was found: the torque that loads the gears or that the motion takes, the gain and
+    /// bias of a drive, or what the joints carry.
+    pub reads_found: bool,
     /// Whether it changes the effort before it acts. It is told by the torque that the motion takes.
     pub on_effort: bool,
     /// How its motor turns on its own.
@@ -258,7 +258,7 @@ impl Card {
         exact_to: EXACT_TO,
         exact_to_samples: 0.0,
         bends: false,
-        reads_torque: false,
+        reads_found: false,
         on_effort: false,
         turning: None,
         rotor: false,

@@ -11,6 +11,9 @@ use statrs::function::erf::erf;
 pub struct Motion<'a> {
     /// The nominal robot.
     pub model: &'a Model,
+    /// The robot with the bodies and the gravity that were found, as far as they were: what a wrong angle does to the torque
+    /// hangs on what the joint carries.
+    pub bodies: &'a Model,
     /// Positions, rad or m.
     pub q: &'a [Vec<f64>],
     /// Velocities, rad/s or m/s.
@@ -160,6 +163,7 @@ mod tests {
             let held = Held { effort: &[], first: 0, stride, weights: &weights };
             let motion = Motion {
                 model: &model,
+                bodies: &model,
                 q: &[],
                 v: &[],
                 a: &[],

@@ -307,6 +307,7 @@ fn predicted(
     let standing = vec![0.0; n];
     let motion = Motion {
         model,
+        bodies: model,
         q: &q,
         v: &v,
         a: &a,

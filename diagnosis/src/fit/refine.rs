@@ -9,6 +9,7 @@ use crate::record::data::Data;
 use crate::record::signals::Signals;
 use gapscope_effects::{Candidate, Effect, EffectError, Kind, Motion, Plant};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Rounds, at most.
 const ROUNDS: usize = 8;
@@ -127,6 +128,10 @@ impl Data<'_> {
         let early = |c: &usize| !candidate(*c).kind.card().on_effort;
         let taken = Fit { set: fit.set.iter().copied().filter(early).collect(), ..fit.clone() };
         let taken = taken.effects(problem, self.model);
+        let bodies = match self.signals.first() {
+            Some(s) => Arc::new(Plant::new(self.model, &effects, s.dt)?.model().clone()),
+            None => return Ok(Vec::new()),
+        };
         self.signals
             .par_iter()
             .map(|s| {
@@ -140,6 +145,7 @@ impl Data<'_> {
                 Ok(Signals {
                     load: Some(torque(&effects, if crossed { &s.tau } else { &idle })?),
                     taken: Some(torque(&taken, if crossed { &s.tau } else { &idle })?),
+                    bodies: Some(bodies.clone()),
                     drives: plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?.drives(),
                     ..s.clone()
                 })
@@ -209,7 +215,7 @@ impl Data<'_> {
         let mut found: Option<Bend> = None;
         let bends = candidates.iter().any(|c| c.kind.card().bends);
         let least = if bends { ROUNDS_FOR_BENT } else { 1 };
-        let loads = candidates.iter().any(|c| c.kind.card().reads_torque);
+        let loads = candidates.iter().any(|c| c.kind.card().reads_found);
         let turns = candidates.iter().any(Candidate::turns);
         let most = if turns { ROUNDS_OF_TURNING } else { ROUNDS };
         let mut settled = !turns;

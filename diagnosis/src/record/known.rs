@@ -1,4 +1,4 @@
-//! Filtered columns that every problem of the same logs has alike: those of laws without a knob that read no torque.
+//! Filtered columns that every problem of the same logs has alike: those of laws without a knob that read nothing found.
 
 use crate::record::band::Band;
 use crate::record::signals::Signals;
@@ -17,7 +17,7 @@ impl Known {
             // A push is known by when it comes, and that is found later.
             c.shape == 0.0
                 && c.kind.card().turned_by_tangent().is_none()
-                && !c.kind.card().reads_torque
+                && !c.kind.card().reads_found
                 && !c.kind.card().of_its_log
         };
         let mut candidates = Candidate::all(model);

@@ -13,6 +13,7 @@ use gapscope_rollout::Trajectory;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
+use std::sync::Arc;
 
 /// Half-width of the kernel that forms derivatives, s; about 46 Hz.
 const DERIVATIVE_HALF_WIDTH: f64 = 0.010;
@@ -58,6 +59,8 @@ pub struct Signals {
     pub load: Option<Vec<Vec<f64>>>,
     /// Torque that the motion takes with what was found, N m or N, where that is known.
     pub taken: Option<Vec<Vec<f64>>>,
+    /// The robot with the bodies and the gravity that were found, where they are known.
+    pub bodies: Option<Arc<Model>>,
     /// Gain and bias (N m or N) of each joint's drive, where they are known.
     pub drives: Vec<(f64, f64)>,
     /// Standard deviation of the white noise of each joint's position, rad or m.
@@ -128,6 +131,7 @@ impl Signals {
             nominal: vec![Vec::with_capacity(length); n],
             load: None,
             taken: None,
+            bodies: None,
             drives: Vec::new(),
             position_noise,
             velocity_noise,
@@ -200,6 +204,7 @@ impl Signals {
     pub fn motion<'a>(&'a self, model: &'a Model, standstill: &'a [f64]) -> Motion<'a> {
         Motion {
             model,
+            bodies: self.bodies.as_deref().unwrap_or(model),
             q: &self.q,
             v: &self.v,
             a: &self.a,

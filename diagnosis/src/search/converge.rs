@@ -44,7 +44,7 @@ impl Record<'_> {
             // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
             let loaded = data.loaded(&exact, &fit)?;
             let data = Data { signals: &loaded, ..data };
-            let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind.card().reads_torque;
+            let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind.card().reads_found;
             let under_load = all.entries.iter().enumerate().filter(of_load);
             let changes: Vec<(usize, Candidate)> =
                 under_load.map(|(c, e)| (c, e.candidate.clone())).chain(changes).collect();

@@ -48,7 +48,7 @@ impl Signature for ActuationDelay {
         passes: Some(late),
         size: Size::Along(&[Gauge::along("delay", &[1.0])]),
         exact_to_samples: LATE_EXACT_TO,
-        reads_torque: true,
+        reads_found: true,
         on_effort: true,
         weighs: true,
         ..Card::BLANK

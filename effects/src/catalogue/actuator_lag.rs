@@ -54,7 +54,7 @@ impl Signature for ActuatorLag {
         passes: Some(first_order),
         size: Size::Along(&[Gauge::along("time_constant", &[1.0])]),
         exact_to_samples: LATE_EXACT_TO,
-        reads_torque: true,
+        reads_found: true,
         on_effort: true,
         weighs: true,
         ..Card::BLANK

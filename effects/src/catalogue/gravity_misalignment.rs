@@ -65,6 +65,7 @@ impl Signature for GravityMisalignment {
             "log with the base turned about the vertical: what a tilt does changes, what belongs to a joint stays",
         ),
         bends: true,
+        reads_found: true,
         weighs: true,
         common: true,
         ..Card::BLANK
@@ -93,13 +94,13 @@ const TILT: f64 = 0.05;
 ///
 /// Along z gravity changes by second order only, g (1 − cos), which the fit leaves out.
 fn signature(motion: &Motion) -> Vec<Column> {
-    let n = motion.model.dof();
-    let mut data = Data::new(motion.model);
+    let n = motion.bodies.dof();
+    let mut data = Data::new(motion.bodies);
     let (mut q, mut torque) = (vec![0.0; n], vec![0.0; n]);
     [DVec3::X, DVec3::Y]
         .into_iter()
         .map(|direction| {
-            let model = motion.model.clone().with_gravity(direction);
+            let model = motion.bodies.clone().with_gravity(direction);
             let mut rows: Vec<(usize, Vec<f64>)> = (0..n).map(|j| (j, Vec::with_capacity(motion.len()))).collect();
             for k in 0..motion.len() {
                 for j in 0..n {

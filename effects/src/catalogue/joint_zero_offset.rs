@@ -47,6 +47,7 @@ impl Signature for JointZeroOffset {
         meaning: "the encoder's zero is off",
         size: Size::Along(&[Gauge::along("offset", &[1.0])]),
         bends: true,
+        reads_found: true,
         ..Card::BLANK
     };
 
@@ -77,7 +78,7 @@ const SPREAD: f64 = 0.05;
 /// Step of the derivative, rad or m.
 const STEP: f64 = 1e-4;
 
-/// One column: the negative derivative of the nominal torque with respect to the joint's position, on every joint.
+/// One column: the negative derivative of the torque that the bodies take with respect to the joint's position, on every joint.
 /// Coefficient: the offset. Exact to first order in the offset.
 fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     let ahead = vec![STEP; motion.len()];
@@ -85,11 +86,11 @@ fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     vec![moved(motion, joint, [&ahead, &still, &still], 1.0 / STEP, f64::NEG_INFINITY)]
 }
 
-/// What the nominal torque of every joint loses when one joint lies behind its logged motion by a run of position,
+/// What the torque that bodies take of every joint loses when one joint lies behind its logged motion by a run of position,
 /// velocity and acceleration; times `factor`.
 pub(crate) fn moved(motion: &Motion, joint: usize, behind: [&[f64]; 3], factor: f64, at_least: f64) -> Column {
-    let n = motion.model.dof();
-    let mut data = Data::new(motion.model);
+    let n = motion.bodies.dof();
+    let mut data = Data::new(motion.bodies);
     let mut torque = [vec![0.0; n], vec![0.0; n]];
     let [mut q, mut v, mut a] = std::array::from_fn(|_| vec![0.0; n]);
     let mut rows: Vec<(usize, Vec<f64>)> = (0..n).map(|j| (j, Vec::with_capacity(motion.len()))).collect();
@@ -101,7 +102,7 @@ pub(crate) fn moved(motion: &Motion, joint: usize, behind: [&[f64]; 3], factor: 
             q[joint] += side * behind[0][k];
             v[joint] += side * behind[1][k];
             a[joint] += side * behind[2][k];
-            motion.model.inverse_dynamics(&mut data, &q, &v, &a, torque);
+            motion.bodies.inverse_dynamics(&mut data, &q, &v, &a, torque);
         }
         for (j, row) in &mut rows {
             row.push(factor * (torque[0][*j] - torque[1][*j]));

@@ -49,7 +49,7 @@ impl Signature for LoadDependentFriction {
         meaning: "friction that grows with the torque through the gear",
         size: Size::Along(&[Gauge::along("load_coefficient", &[1.0])]),
         bends: true,
-        reads_torque: true,
+        reads_found: true,
         ..Card::BLANK
     };
 

@@ -88,6 +88,7 @@ fn a_gauge_has_a_direction_for_each_column_and_a_body_ten() {
     let still = [0.01; 6];
     let motion = Motion {
         model: &model,
+        bodies: &model,
         q: &signals[0],
         v: &signals[1],
         a: &signals[2],

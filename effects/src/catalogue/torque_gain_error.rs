@@ -52,7 +52,7 @@ impl Signature for TorqueGainError {
             "repeat the motion with a known mass at the flange: a gain scales its torque, other effects do not",
         ),
         bends: true,
-        reads_torque: true,
+        reads_found: true,
         on_effort: true,
         weighs: true,
         ..Card::BLANK

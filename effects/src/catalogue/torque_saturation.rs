@@ -54,7 +54,7 @@ impl Signature for TorqueSaturation {
         // Where a place rubs, efforts are great, and a limit would cut them.
         excludes: &[Kind::Rub, Kind::Catch],
         size: Size::Knob("limit", ["N m", "N"]),
-        reads_torque: true,
+        reads_found: true,
         unit_coefficient: true,
         ..Card::BLANK
     };

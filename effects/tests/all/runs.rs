@@ -5,7 +5,8 @@ use crate::{common, support};
 use common::robot;
 use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{
-    Candidate, CoulombFriction, Effect, EncoderSide, Kind, LoadDependentFriction, Motion, Plant, Range,
+    Candidate, CoulombFriction, Effect, EncoderSide, JointZeroOffset, Kind, LoadDependentFriction, Motion, Payload,
+    Plant, Range,
 };
 use support::motion;
 
@@ -136,6 +137,35 @@ fn columns_of_offset_and_load_are_exact_to_first_order() {
         assert!(whole < 0.1 * largest, "{candidate:?}: {whole:e} of {largest:e}");
         assert!(half < 0.35 * whole, "{candidate:?}: {half:e} at half of what leaves {whole:e}");
     }
+}
+
+/// What a wrong zero does hangs on what the joint carries: a tool of a tenth of the arm's mass may double it at a wrist.
+#[test]
+fn the_column_of_an_offset_is_that_of_the_bodies_that_were_found() {
+    let model = robot("arm6");
+    let tool = Payload { joint: "joint6".into(), mass: 2.0, com: [0.02, 0.03, 0.1], inertia: [0.0; 6] };
+    let with = |offset: f64| {
+        let zero = JointZeroOffset { offset: std::iter::once(("joint4".to_owned(), offset)).collect() };
+        Plant::new(&model, &[Effect::Payload(tool.clone()), Effect::JointZeroOffset(zero)], DT).unwrap()
+    };
+    let run = Run::new(&model);
+    let found = with(0.0).model().clone();
+    let motion = run.motion(&model);
+    let (offset, candidate) = (1e-3, Candidate::new(Kind::JointZeroOffset, vec![3]));
+    let (more, less) = (with(offset).residuals(&motion), with(-offset).residuals(&motion));
+    let column = |bodies: &Model| candidate.columns(&Motion { bodies, ..motion });
+    let off = |bodies: &Model| {
+        let (mut worst, mut largest) = (0.0f64, 0.0f64);
+        for (j, row) in &column(bodies)[0].rows {
+            for k in 0..row.len() {
+                let exact = (more[*j][k] - less[*j][k]) / (2.0 * offset);
+                (worst, largest) = (worst.max((row[k] + exact).abs()), largest.max(exact.abs()));
+            }
+        }
+        worst / largest
+    };
+    assert!(off(&found) < 1e-3, "{}", off(&found));
+    assert!(off(&model) > 0.2, "{}", off(&model));
 }
 
 /// Its column is of the torque that the motion takes, its residual where the effort acts: they differ by what the run leaves.

@@ -31,6 +31,7 @@ pub fn motion<'a>(model: &'a Model, signals: [&'a [Vec<f64>]; 5], dt: f64, stand
     let [q, v, a, tau, nominal] = signals;
     Motion {
         model,
+        bodies: model,
         q,
         v,
         a,

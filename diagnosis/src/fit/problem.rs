@@ -273,7 +273,7 @@ impl Problem {
         if motor { EncoderSide::Motor } else { EncoderSide::Link }
     }
 
-    /// Puts other candidates of the same kinds and joints in the places of some entries.
+    /// Puts other candidates of the same kinds and joints in the places of some entries, and reads anew what the alignment does.
     pub fn replace(
         &mut self,
         model: &Model,
@@ -282,6 +282,20 @@ impl Problem {
         standstill: &[f64],
         changes: &[(usize, Candidate)],
     ) {
+        self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
+            let Some(at) = rows.columns.iter().position(|&column| column == 0) else { return };
+            let mut values = vec![0.0; band.rows.len()];
+            for (e, s) in signals.iter().enumerate() {
+                let filtered = band.filter_where(e, &s.slides(j, standstill[j]), &s.taken_rate(j));
+                for (row, x) in band.of_episode[e].clone().zip(filtered) {
+                    values[row] = x.unwrap_or(0.0);
+                }
+            }
+            let m = rows.columns.len();
+            for (r, &row) in rows.rows.iter().enumerate() {
+                rows.values[r * m + at] = values[row];
+            }
+        });
         for (c, candidate) in changes {
             let begin = self.entries[*c].columns.start;
             let runs: Vec<Vec<Column>> =

@@ -215,7 +215,6 @@ impl Data<'_> {
         let mut found: Option<Bend> = None;
         let bends = candidates.iter().any(|c| c.kind.card().bends);
         let least = if bends { ROUNDS_FOR_BENT } else { 1 };
-        let loads = candidates.iter().any(|c| c.kind.card().reads_found);
         let turns = candidates.iter().any(Candidate::turns);
         let most = if turns { ROUNDS_OF_TURNING } else { ROUNDS };
         let mut settled = !turns;
@@ -279,9 +278,8 @@ impl Data<'_> {
                 problem = data.about(plain, found.as_ref());
                 at = Fit::on_all(&problem, &set);
             }
-            if loads {
-                loaded = Some(self.loaded(&problem, &at)?);
-            }
+            // How late the effort acts is told by the torque that the motion takes, as are other laws.
+            loaded = Some(self.loaded(&problem, &at)?);
             let data = Data { signals: loaded.as_deref().unwrap_or(self.signals), ..*self };
             let bend = if turns {
                 let Some((bend, misfit)) = data.down(&problem, &mut at, reached.as_ref())? else {

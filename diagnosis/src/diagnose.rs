@@ -12,7 +12,6 @@ use crate::answer::regimes::regimes;
 use crate::answer::structure;
 use crate::answer::verdict::Judged;
 use crate::carry::corrected::{Corrected, MODEL_SCHEMA};
-use crate::numbers::decide::LEAST_ROWS;
 use crate::record::floor::noise_floor;
 use crate::record::known::Known;
 use crate::record::logs::{Progress, Record};
@@ -80,6 +79,9 @@ pub fn diagnose(
     logs.conclude(&chosen, &rivals, data, progress)
 }
 
+/// Fewer rows than this tell nothing: two seconds at the usual cut-off.
+const LEAST_ROWS: usize = 50;
+
 impl Record<'_> {
     fn is_excited(&self) -> bool {
         self.moving.iter().any(|m| *m) && self.band.rows.len() >= LEAST_ROWS
@@ -124,7 +126,7 @@ impl Record<'_> {
             let time = s.first as f64 * s.raw.dt + row.center as f64 * s.dt;
             s.pushed.iter().all(|[from, to]| time < from - EDGE || time > to + EDGE)
         };
-        let pushes = effects.iter().any(|e| e.kind().card().of_its_log);
+        let pushes = effects.iter().any(|e| e.kind().card().of_its_log());
         let counts = |i: usize| !pushes || untouched(i);
         let concern = rows::weights_of_concern(model, &self.signals, &self.moving);
         // An impact a moment early or late is no fault of the play that makes it, and all joints feel it.
@@ -159,7 +161,7 @@ impl Record<'_> {
             encoder_side: side,
             alignment: fit.alignment(),
             // A push belongs to its own log.
-            effects: effects.into_iter().filter(|e| !e.kind().card().of_its_log).collect(),
+            effects: effects.into_iter().filter(|e| !e.kind().card().of_its_log()).collect(),
             made_from: None,
         };
         let gap_of = |held_out: &HeldOut| Gap {

@@ -22,4 +22,5 @@ pub use carry::rollout::{BoundGrowth, Contender, ModelRollouts, RolloutError, Ro
 pub use diagnose::{Outcome, diagnose};
 pub use fit::sums::{Place, Sums, SumsError};
 pub use gapscope_effects::EncoderSide;
+pub use numbers::decide::{ALL as NUMBERS, Number};
 pub use record::logs::Progress;

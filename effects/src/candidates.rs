@@ -49,7 +49,7 @@ impl Candidate {
                     Some((Turned::Not, Grid::Fixed(choices))) => choices(),
                     Some(_) => Vec::new(),
                 };
-                if card.turning.is_none() && !card.of_its_log {
+                if card.turning.is_none() && !card.of_its_log() {
                     let at = |joints: Vec<usize>| {
                         shapes.iter().map(move |&shape| Candidate::at(kind, joints.clone(), shape))
                     };
@@ -113,14 +113,14 @@ impl Candidate {
 
     /// What acts for some of the time at each of its places, for motions that know when.
     pub fn contacts(model: &Model) -> Vec<Candidate> {
-        let kinds = Kind::ALL.into_iter().filter(|kind| kind.card().of_its_log);
+        let kinds = Kind::ALL.into_iter().filter(|kind| kind.card().of_its_log());
         let at = |kind: Kind| kind.card().place.of(model).into_iter().map(move |joints| Candidate::new(kind, joints));
         kinds.flat_map(at).collect()
     }
 
     /// A signal, `dt` s from sample to sample, as a law that acts late passes it on; as it is for any other.
     pub fn passed_on(&self, signal: &[f64], dt: f64) -> Vec<f64> {
-        self.kind.card().passes.map_or_else(|| signal.to_vec(), |passes| passes(signal, self.shape, dt))
+        self.kind.card().late.map_or_else(|| signal.to_vec(), |late| (late.passes)(signal, self.shape, dt))
     }
 
     /// Whether it is a drive that turns on its own: a spring or play.

@@ -18,8 +18,8 @@ pub struct Card {
     pub knob: Option<Knob>,
     /// The force that it accounts for: a joint has one account of it.
     pub force: Option<Force>,
-    /// How it passes the effort on, where it says how late that acts.
-    pub passes: Option<Passes>,
+    /// How late the effort acts, where it says so.
+    pub late: Option<Late>,
     /// Other kinds that it cannot stand beside at the same joints.
     pub excludes: &'static [Kind],
     /// What is asked for as its least size that logs would have shown.
@@ -53,16 +53,16 @@ pub struct Card {
     pub weighs: bool,
     /// Whether it is so common that a look for pushes from outside takes it into account.
     pub common: bool,
-    /// Whether it is of one log alone, at the times that the log shows: no other log has it.
-    pub of_its_log: bool,
+    /// How something outside pushes: it is of one log alone, at the times that the log shows.
+    pub pushes: Option<Pushes>,
     /// Whether its coefficient is one wherever its knob is known.
     pub unit_coefficient: bool,
     /// Whether it is the same law where one of its coefficients is nothing.
     pub optional_parts: bool,
     /// The kind that takes its place where a joint bears more at rest than this one holds.
     pub sticks_as: Option<Kind>,
-    /// Its parameters of sliding and of rest, where rests tell what motion does not.
-    pub at_rest: Option<[&'static str; 2]>,
+    /// What rests tell of it that motion does not.
+    pub rests: Option<Rests>,
 }
 
 /// How usual a kind is.
@@ -93,8 +93,53 @@ pub enum Place {
     Pair,
 }
 
-/// What passes a signal on: its samples, how late, and the time from sample to sample, both s.
-pub type Passes = fn(&[f64], f64, f64) -> Vec<f64>;
+/// Effort that acts late, and what tells two such laws apart.
+#[derive(Debug, Clone, Copy)]
+pub struct Late {
+    /// What passes a signal on: its samples, how late, and the time from sample to sample, both s.
+    pub passes: fn(&[f64], f64, f64) -> Vec<f64>,
+    /// Nats, at most, by which the size of what two such laws leave speaks for one of them: noise is in it, and turns the balance
+    /// at best.
+    pub hint: f64,
+    /// Part of its square that noise may have of the torque by which they are told apart: a servo answers to the noise of the
+    /// position, and that answer is in what is left as well.
+    pub noise_in_instrument: f64,
+    /// A servo's answer to the noise of the position, over the torque that this noise makes of the motion: up to so many times,
+    /// as standard deviation of what it may do to what tells them apart. Measured: 8 to 19.
+    pub servo_answers: f64,
+}
+
+impl Late {
+    /// A law that a log of a servo tells from another.
+    pub(crate) const fn told(passes: fn(&[f64], f64, f64) -> Vec<f64>) -> Late {
+        Late { passes, hint: 1.0, noise_in_instrument: 0.01, servo_answers: 10.0 }
+    }
+}
+
+/// What pushes from outside.
+#[derive(Debug, Clone, Copy)]
+pub struct Pushes {
+    /// What stands out for longer than this part of the logs is no push.
+    pub longest: f64,
+    /// Standard error of the part of a force that is there from which on a row says nothing of it.
+    pub unclear: f64,
+}
+
+/// Friction that holds more at rest than in motion.
+#[derive(Debug, Clone, Copy)]
+pub struct Rests {
+    /// Its parameter of sliding.
+    pub sliding: &'static str,
+    /// Its parameter of rest.
+    pub at_rest: &'static str,
+    /// Part of the logs that a joint must rest for its rests to tell: the blows of other joints would outweigh few of them.
+    pub least: f64,
+    /// Part of the rests that end well below the break-away torque, ...
+    pub well_below: f64,
+    /// ... and by so many times what the others differ, it may lie higher: a rest that ends in a moment is averaged with what
+    /// comes before.
+    pub spreads: f64,
+}
 
 /// A force that several kinds account for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -250,7 +295,7 @@ impl Card {
         place: Place::Joint,
         knob: None,
         force: None,
-        passes: None,
+        late: None,
         excludes: &[],
         size: Size::Unasked,
         axis: Axis::Prediction,
@@ -266,11 +311,11 @@ impl Card {
         described: false,
         weighs: false,
         common: false,
-        of_its_log: false,
+        pushes: None,
         unit_coefficient: false,
         optional_parts: false,
         sticks_as: None,
-        at_rest: None,
+        rests: None,
     };
 
     /// Whether the law filters what was measured, so that its noise comes out larger or smaller.
@@ -278,9 +323,14 @@ impl Card {
         self.turning.is_some() || self.on_effort
     }
 
+    /// Whether it is of one log alone: no other log has it.
+    pub fn of_its_log(&self) -> bool {
+        self.pushes.is_some()
+    }
+
     /// Whether it says how late the effort acts.
     pub fn is_late(&self) -> bool {
-        self.passes.is_some()
+        self.late.is_some()
     }
 
     /// Whether its knob is a choice, where it has one: it stays as it is.

@@ -24,7 +24,7 @@ mod wind_up;
 
 pub use bodies::{Body, Divergence, keep_bodies};
 pub use candidate::{Candidate, EncoderSide, Range};
-pub use card::{Apart, Axis, Card, Force, Gauge, Grid, Knob, Part, Passes, Place, Size, Turned, Turning};
+pub use card::{Apart, Axis, Card, Force, Gauge, Grid, Knob, Late, Part, Place, Pushes, Rests, Size, Turned, Turning};
 pub use catalogue::*;
 pub use column::Column;
 pub use error::EffectError;

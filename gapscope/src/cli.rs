@@ -102,6 +102,31 @@ pub enum Study {
     ServoLogs(RealLogs),
     /// Several logs of one machine, each diagnosed alone: whether the answers agree
     Agreement(RealLogs),
+    /// The numbers that decide an answer, each at a half and at double: what that does to the answers on withheld cases
+    Numbers(Numbers),
+}
+
+/// Arguments of `study numbers`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  gapscope withheld make used --used --cases 12 --seed 9
+  gapscope study numbers used --force")]
+pub struct Numbers {
+    /// Banks of used arms, made by `withheld make`
+    #[arg(required = true, value_name = "BANK")]
+    pub banks: Vec<PathBuf>,
+    /// These numbers alone [default: all]
+    #[arg(long, value_name = "NUMBER")]
+    pub only: Vec<String>,
+    /// Folder for the table
+    #[arg(long, default_value = "docs/studies", value_name = "DIR")]
+    pub out: PathBuf,
+    /// Replace results that are in the folder already
+    #[arg(long)]
+    pub force: bool,
+    /// How the cases are diagnosed
+    #[command(flatten)]
+    pub how: Trials,
 }
 
 /// Arguments of the studies of logs of real machines.
@@ -235,6 +260,9 @@ pub struct Trials {
     /// Longest time that a diagnosis may take, s
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 600.0)]
     pub timeout: f64,
+    /// A number that decides, turned by a factor, as `diagnose --turn` takes it.
+    #[arg(skip)]
+    pub turn: Option<String>,
 }
 
 /// Arguments of `withheld calibrate`.

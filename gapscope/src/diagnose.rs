@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use gapscope_datasets::{Bound, Trajectory};
 use gapscope_diagnosis::schema::Evidence;
-use gapscope_diagnosis::{NEXT_EXPERIMENT, Outcome, Progress as Told, diagnose};
+use gapscope_diagnosis::{NEXT_EXPERIMENT, NUMBERS, Outcome, Progress as Told, diagnose};
 use std::path::Path;
 use std::path::PathBuf;
 
@@ -38,6 +38,9 @@ pub struct Diagnose {
     /// How well the links' inertials are known: weighed, cad (the default) or guessed; or one link's, e.g. `link6=weighed`
     #[arg(long, value_name = "[LINK=]SOURCE")]
     pub trust: Vec<String>,
+    /// Turn a number that decides by a factor, e.g. `TWENTY_TO_ONE=2`: for `study numbers`
+    #[arg(long, hide = true, value_name = "NUMBER=FACTOR")]
+    pub turn: Option<String>,
     /// Print what was proposed, against what, and by how much the logs spoke for or against it
     #[arg(long)]
     pub why: bool,
@@ -54,6 +57,9 @@ pub struct Diagnose {
 /// # Errors
 /// Bad input, or results that exist or cannot be written.
 pub fn run(args: &Diagnose) -> Result<String> {
+    if let Some(turn) = &args.turn {
+        turned(turn)?;
+    }
     let first = args.input.logs.first().context("no log is given")?;
     let out = output::folder(args.out.as_deref(), first, args.force)?;
     let progress = Progress::new(args.quiet);
@@ -71,6 +77,19 @@ pub fn run(args: &Diagnose) -> Result<String> {
         text += &found.why();
     }
     Ok(text)
+}
+
+/// Turns a number that decides, given as NAME=FACTOR.
+fn turned(turn: &str) -> Result<()> {
+    let names = || NUMBERS.iter().map(|number| number.name).collect::<Vec<_>>().join(", ");
+    let wrong =
+        || format!("--turn {turn}: give NUMBER=FACTOR, the factor above zero and the number one of {}", names());
+    let (name, factor) = turn.split_once('=').with_context(wrong)?;
+    let number = NUMBERS.iter().find(|number| number.name == name).with_context(wrong)?;
+    let factor: f64 =
+        factor.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0).with_context(wrong)?;
+    number.turn(factor);
+    Ok(())
 }
 
 /// What a diagnosis found, before any of it is written.

@@ -3,6 +3,7 @@
 mod agreement;
 mod closed_loop;
 mod learning;
+mod numbers;
 mod real_logs;
 mod servo_logs;
 
@@ -24,5 +25,6 @@ pub fn run(study: &Study) -> Result<String> {
         Study::Agreement(args) => agreement::run(args),
         Study::RealLogs(args) => real_logs::run(args),
         Study::ServoLogs(args) => servo_logs::run(args),
+        Study::Numbers(args) => numbers::run(args),
     }
 }

@@ -67,7 +67,7 @@ pub fn combinations(problem: &Problem, fit: &Fit, model: &Model) -> Vec<Combinat
             let value: f64 = along.iter().zip(&fit.theta).map(|(weight, theta)| weight * theta).sum();
             let half = along.dot(&(&squares * &along)).sqrt();
             let known = found.iter().any(|(_, earlier)| earlier.terms == terms);
-            if !terms.is_empty() && !known && half < DETERMINED * before.sqrt() {
+            if !terms.is_empty() && !known && half < DETERMINED.get() * before.sqrt() {
                 let ci95 = [value - half, value + half];
                 found.push((value.abs() / half, Combination { words, terms, value, ci95, unit: unit.to_owned() }));
             }

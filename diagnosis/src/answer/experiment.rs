@@ -8,7 +8,7 @@ use crate::fit::estimate::Fit;
 use crate::fit::plant::plant;
 use crate::fit::problem::Problem;
 use crate::fit::terms::Term;
-use crate::numbers::decide::SEPARATED;
+use crate::numbers::decide::CLEAR;
 use crate::record::band::Band;
 use crate::record::data::Data;
 use crate::record::known::Known;
@@ -124,7 +124,7 @@ pub fn next_experiment(
     // The first of equals: the order of the library does not depend on the number of threads.
     let best = tried.into_iter().reduce(|best, other| if other.0 > best.0 { other } else { best });
     let proposal = match best {
-        Some((separation, design, trajectory)) if separation >= SEPARATED => {
+        Some((separation, design, trajectory)) if separation >= CLEAR.get() => {
             let motion = format!(
                 "follow {FILE} (look for collisions first): {}. {} and {other} would then lie {separation:.0} standard \
                  errors apart",

@@ -4,7 +4,7 @@ use crate::answer::covariance::covariance;
 use crate::answer::verdict::Judged;
 use crate::fit::estimate::{Fit, speeds};
 use crate::fit::problem::Problem;
-use crate::numbers::decide::{MISFIT, THERE, TWENTY_TO_ONE, WORTH_NAMING};
+use crate::numbers::decide::{LEAST_THERE, MISFIT, MOST_THERE, TWENTY_TO_ONE};
 use crate::record::logs::Record;
 use crate::record::rows::Rows;
 use crate::schema::*;
@@ -16,7 +16,7 @@ use gapscope_effects::{EffectError, Kind};
 
 /// The part of effects with such an evidence that are there.
 fn calibrated(evidence: f64) -> f64 {
-    THERE.0 + (THERE.1 - THERE.0) * evidence
+    LEAST_THERE.get() + (MOST_THERE.get() - LEAST_THERE.get()) * evidence
 }
 
 impl Record<'_> {
@@ -53,13 +53,13 @@ impl Record<'_> {
             };
             let others: Vec<&Rival> = rival.into_iter().chain(&swap).filter(|_| turned.is_none()).collect();
             // What could be another is no surer than that it is not.
-            let tied = others.iter().map(|r| r.odds).filter(|odds| *odds < TWENTY_TO_ONE);
+            let tied = others.iter().map(|r| r.odds).filter(|odds| *odds < TWENTY_TO_ONE.get());
             let odds = tied.fold(odds, |odds, tied| odds.min(tied.max(0.0)));
             let doubt = late.unwrap_or(0.0).max(1.0 / (1.0 + odds.exp()));
-            let near = others.iter().filter(|r| late.is_none() && r.odds.min(r.by_logs) < TWENTY_TO_ONE);
+            let near = others.iter().filter(|r| late.is_none() && r.odds.min(r.by_logs) < TWENTY_TO_ONE.get());
             let mut confused: Vec<String> =
                 near.flat_map(|r| r.instead(&chosen.all, &chosen.choice)).map(|kind| kind.name().to_owned()).collect();
-            if late.is_some_and(|doubt| doubt > (-TWENTY_TO_ONE).exp()) {
+            if late.is_some_and(|doubt| doubt > (-TWENTY_TO_ONE.get()).exp()) {
                 confused.extend(climb::late().filter(|other| *other != kind).map(|k| k.name().to_owned()));
             }
             confused.sort();
@@ -74,7 +74,7 @@ impl Record<'_> {
                     kind: kind.name().to_owned(),
                     joints: effect.law().joints(),
                     part: if kind.is_calibration() { Part::Calibration } else { Part::Further },
-                    confidence: calibrated((1.0 - doubt) * (1.0 - misfit).powi(MISFIT)),
+                    confidence: calibrated((1.0 - doubt) * (1.0 - misfit).powf(MISFIT.get())),
                     parameters: Fit::parameters(&of_it, self.model),
                     indistinguishable_from: confused,
                     shrink: EffectShrink { torque: alone.shrink, ci95: alone.ci95 },
@@ -141,7 +141,7 @@ impl Record<'_> {
 pub(crate) fn alternatives(problem: &Problem, rivals: &[Rival]) -> Vec<Alternative> {
     let mut all: Vec<Alternative> = rivals
         .iter()
-        .filter(|r| r.probability() > WORTH_NAMING)
+        .filter(|r| r.probability() > (-TWENTY_TO_ONE.get()).exp())
         .map(|r| Alternative {
             effects: climb::kinds(problem, &r.choice.set)
                 .iter()

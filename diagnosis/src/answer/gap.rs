@@ -1,7 +1,7 @@
 //! Where the gap lies, and how far it shrinks: figures of residuals at the rows of the band, on held-out data.
 
 use crate::numbers::bootstrap::interval;
-use crate::numbers::decide::AT_FLOOR;
+use crate::numbers::decide::FLOOR_KNOWN_TO;
 use crate::record::band::Band;
 use crate::record::rows::{Rows, squares, total, weighted_rms};
 use crate::schema::{Change, PerJoint, TorqueGap};
@@ -41,7 +41,7 @@ pub fn change(before: &[Vec<f64>], after: &[Vec<f64>], weights: &[f64], floor: f
     let sums = total(&pairs);
     let (b, a) = sums.split_at(sums.len() / 2);
     let (b, a) = (weighted_rms(b, weights), weighted_rms(a, weights));
-    let claimed = b > AT_FLOOR * floor;
+    let claimed = b > FLOOR_KNOWN_TO.get().recip() * floor;
     Change {
         before: Some(b),
         after: Some(a),

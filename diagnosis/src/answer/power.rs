@@ -131,7 +131,7 @@ fn least(problem: &Problem, set: &[usize], c: usize, direction: &[f64], beside_o
     let competition = Competition::new(problem);
     let price = competition.prior(&others) - competition.prior(&with) + problem.occam(&own, &information);
     // Half of the deviance is a nat.
-    Some((2.0 * price.max(TWENTY_TO_ONE) / gain).sqrt())
+    Some((2.0 * price.max(TWENTY_TO_ONE.get()) / gain).sqrt())
 }
 
 /// The part of some columns' inner products that others explain.

@@ -14,7 +14,7 @@ const SECONDS: usize = 12;
 /// of its square.
 pub fn noise(rows: &[f64], predicted: f64) -> Option<f64> {
     let power = rows.iter().map(|x| x * x).sum::<f64>();
-    if power <= 0.0 || rows.len() < SECOND * SECONDS || predicted > PREDICTED {
+    if power <= 0.0 || rows.len() < SECOND * SECONDS || predicted > PREDICTED.get() {
         return None;
     }
     let correlation = |lag: usize| rows.iter().zip(&rows[lag..]).map(|(a, b)| a * b).sum::<f64>() / power;
@@ -25,8 +25,8 @@ pub fn noise(rows: &[f64], predicted: f64) -> Option<f64> {
         rows.chunks_exact(SECOND).map(|second| mean(&second.iter().map(|x| x * x).collect::<Vec<_>>())).collect();
     let middle = mean(&seconds);
     let spread = mean(&seconds.iter().map(|s| (s - middle).powi(2)).collect::<Vec<_>>()) / middle.powi(2);
-    let even = spread < UNEVEN * 2.0 * remembered / SECOND as f64;
-    (remembered < REMEMBERED && even).then(|| (power / rows.len() as f64).sqrt())
+    let even = spread < UNEVEN.get() * 2.0 * remembered / SECOND as f64;
+    (remembered < REMEMBERED.get() && even).then(|| (power / rows.len() as f64).sqrt())
 }
 
 #[cfg(test)]

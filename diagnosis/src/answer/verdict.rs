@@ -1,6 +1,6 @@
 //! The answer in a word.
 
-use crate::numbers::decide::{ALONE, ALONE_GAP, EXPLAINED, IMMATERIAL_GAP, MATERIAL_GAP, NEAR_FLOOR};
+use crate::numbers::decide::{EXPLAINED, FLOOR_KNOWN_TO, IMMATERIAL, MATERIAL_GAP, OUTLIER};
 use crate::record::rows;
 use crate::schema::Verdict;
 
@@ -26,12 +26,13 @@ impl Level {
 
     /// Whether what is left is more than noise.
     pub fn leaves_any(&self) -> bool {
-        self.after > NEAR_FLOOR * self.floor
+        self.after > FLOOR_KNOWN_TO.get() * self.floor
     }
 
     /// Whether what is left is material, and more than explained gaps leave.
     fn matters(&self) -> bool {
-        self.after > IMMATERIAL_GAP && (self.unexplained_fraction() > EXPLAINED || self.after > MATERIAL_GAP)
+        self.after > IMMATERIAL.get()
+            && (self.unexplained_fraction() > EXPLAINED.get() || self.after > MATERIAL_GAP.get())
     }
 }
 
@@ -82,7 +83,7 @@ impl Judged {
     /// Whether a joint leaves more than noise and more than explained gaps leave, whatever the others do.
     fn alone(&self, j: usize) -> bool {
         let level = &self.joints[j];
-        self.floored[j] && level.after > (ALONE * level.floor).max(ALONE_GAP) && level.matters()
+        self.floored[j] && level.after > (OUTLIER.get() * level.floor).max(IMMATERIAL.get()) && level.matters()
     }
 
     fn any_alone(&self) -> bool {
@@ -119,7 +120,7 @@ mod tests {
     fn what_is_left_in_one_joint_is_not_lost_in_what_was_found_in_all() {
         // A payload is gone, a spot that rubs in the fourth joint is left: a hundredth of that joint's gap, squared.
         let spot = judged([1.0; 7], one(3, 0.1));
-        assert!(spot.unexplained_fraction() < EXPLAINED);
+        assert!(spot.unexplained_fraction() < EXPLAINED.get());
         assert_eq!(spot.verdict(false, false), Verdict::PartlyExplained);
         assert_eq!(judged([1.0; 7], one(3, 1e-3)).verdict(false, false), Verdict::Explained);
         // Nothing was found, and six quiet joints make noise of the seventh's.

@@ -1,7 +1,7 @@
 //! What no robot has: an effect beyond the robot's own bodies, limits and joints is not reported as found, whatever fits.
 
 use crate::diagnose::Outcome;
-use crate::numbers::decide::COULD_BE;
+use crate::numbers::decide::LEAST_THERE;
 use crate::schema::{Change, FoundEffect, Parameter, Quantity, Verdict};
 use gapscope_dynamics::{Joint, JointKind, Model};
 use gapscope_effects::Effect;
@@ -44,7 +44,7 @@ impl Outcome {
         // Sums and errors were those of all effects together.
         diagnosis.combinations.clear();
         diagnosis.covariance = None;
-        diagnosis.effects.iter_mut().for_each(|effect| effect.confidence = effect.confidence.min(COULD_BE));
+        diagnosis.effects.iter_mut().for_each(|effect| effect.confidence = effect.confidence.min(LEAST_THERE.get()));
         if diagnosis.effects.is_empty() {
             let shrink = &mut diagnosis.shrink;
             let rollouts = shrink.rollout.iter_mut().map(|at| &mut at.change);

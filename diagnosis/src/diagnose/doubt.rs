@@ -1,7 +1,7 @@
 //! A diagnosis of logs that may be wrong: no confident answer where a fault of the data would be the other one.
 
 use crate::diagnose::Outcome;
-use crate::numbers::decide::COULD_BE;
+use crate::numbers::decide::LEAST_THERE;
 use crate::schema::{Change, Gap, Shrink, Verdict};
 use gapscope_datasets::{Doubt, Fault};
 
@@ -13,7 +13,7 @@ impl Outcome {
         for effect in &mut self.diagnosis.effects {
             let other = |doubt: &Doubt| doubt.effects.is_empty() || doubt.effects.contains(&effect.kind);
             if as_logged || doubts.iter().any(other) {
-                effect.confidence = effect.confidence.min(COULD_BE);
+                effect.confidence = effect.confidence.min(LEAST_THERE.get());
             }
         }
         // Of a joint whose effort is not known no gap can be told.

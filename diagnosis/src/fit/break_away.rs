@@ -12,10 +12,10 @@ impl Fit {
     /// does. What does not rise slides.
     pub fn rises(&self, problem: &Problem, model: &Model, candidate: usize, speeds: &[Vec<usize>]) -> bool {
         let kind = problem.entries[candidate].candidate.kind;
-        let Some([sliding, at_rest]) = kind.card().at_rest else { return true };
+        let Some(rests) = kind.card().rests else { return true };
         let told = self.told(problem, model, kind, &[candidate], speeds);
         let of = |name: &str| told.iter().find(|told| told.value.name == name);
-        let (Some(sliding), Some(at_rest)) = (of(sliding), of(at_rest)) else { return false };
+        let (Some(sliding), Some(at_rest)) = (of(rests.sliding), of(rests.at_rest)) else { return false };
         let least: f64 = at_rest.value.value[0] - at_rest.components[0].half_width();
         least > sliding.value.value[0]
     }
@@ -27,7 +27,8 @@ impl Data<'_> {
     /// # Errors
     /// An effect that the robot cannot have.
     pub fn break_away(&self, problem: &mut Problem, fit: &Fit) -> Result<(), EffectError> {
-        let sticks = |&c: &usize| problem.entries[c].candidate.kind.card().at_rest.is_some();
+        let rests = |c: usize| problem.entries[c].candidate.kind.card().rests;
+        let sticks = |&c: &usize| rests(c).is_some();
         let (set, others): (Vec<usize>, Vec<usize>) = fit.set.iter().partition(|c| sticks(c));
         if set.is_empty() {
             return Ok(());
@@ -37,6 +38,7 @@ impl Data<'_> {
         let held: Vec<(usize, Vec<Option<Held>>)> = set
             .into_iter()
             .filter_map(|c| {
+                let rests = rests(c)?;
                 let &[j] = problem.entries[c].candidate.joints.as_slice() else { return None };
                 let mut folds = vec![Vec::new(); self.band.folds];
                 for (e, s) in self.signals.iter().enumerate() {
@@ -46,7 +48,7 @@ impl Data<'_> {
                         folds[self.band.rows[row].fold].push(x);
                     }
                 }
-                Some((c, folds.iter().map(|rows| Held::at_rest(rows, self.noise[j])).collect()))
+                Some((c, folds.iter().map(|rows| Held::at_rest(rows, self.noise[j], &rests)).collect()))
             })
             .collect();
         for (c, held) in held {

@@ -246,8 +246,8 @@ impl Fit {
                                 })
                             })
                             .collect();
-                        if let (Some([_, resting]), Some(held)) = (kind.card().at_rest, at_rest.as_ref())
-                            && estimate.name == resting
+                        if let (Some(rests), Some(held)) = (kind.card().rests, at_rest.as_ref())
+                            && estimate.name == rests.at_rest
                             && estimate.value == [held.torque]
                         {
                             let own = held.doubt.hypot(systematic * size);

@@ -1,170 +1,165 @@
-//! The numbers that decide an answer. Grids, tolerances and limits of loops stand where they are used; what is true of one
-//! kind of effect stands on its card.
+//! The numbers that decide an answer, 25 of them. Budgets of searches, tolerances and limits of loops stand where they are
+//! used; what is true of one kind of effect stands on its card.
+//!
+//! A study turns each to a half and to double and shows what that does to the answers: `gapscope study numbers`.
 
-// What a kind must bring.
+use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Nats of twenty to one. A kind beyond calibration must bring as much, as about one arm in twenty has it; a rival that is less
-/// likely by no more is a tie; an effect that is likelier than none by as much is called seen.
-pub const TWENTY_TO_ONE: f64 = 3.0;
+/// A number that decides.
+#[derive(Debug)]
+pub struct Number {
+    /// Its name, as it stands here.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    value: f64,
+    /// Bits of the factor that a study has turned it by.
+    turned: AtomicU64,
+}
 
-/// Nats that a law outside the catalogue must bring: it is to be rarer than any effect.
-pub const PRICE_OF_OUTSIDE: f64 = 5.0;
+impl Number {
+    const fn new(name: &'static str, unit: &'static str, value: f64) -> Number {
+        Number { name, unit, value, turned: AtomicU64::new(1f64.to_bits()) }
+    }
 
-/// Nats against some links being off while others are right: one may have been wrong in the URDF, or all are a little.
-pub const PRICE_OF_SOME_LINKS: f64 = 20.0;
+    /// Its value.
+    pub fn get(&self) -> f64 {
+        self.value * f64::from_bits(self.turned.load(Ordering::Relaxed))
+    }
 
-/// Nats that a spring or play must bring beside its rotor: as rare as any kind, on either side of the gear, a knob that the
-/// logs know to a twentieth of its range, and what the best of some hundred tries finds in noise.
-pub const PRICE_OF_TURNING: f64 = 3.0 + 0.7 + 3.0 + 9.0;
+    /// Multiplies it by a factor, for all diagnoses of this process, until it is turned again. For studies alone.
+    pub fn turn(&self, factor: f64) {
+        self.turned.store(factor.to_bits(), Ordering::Relaxed);
+    }
+}
 
-/// Part of a joint's effort by which a kind must move it, beside all that the others could do instead: no drive's torque is
-/// known to better.
-pub const MATERIAL: f64 = 0.003;
+macro_rules! numbers {
+    ($($(#[$doc:meta])* $name:ident = $value:expr, $unit:literal;)*) => {
+        $($(#[$doc])* pub static $name: Number = Number::new(stringify!($name), $unit, $value);)*
 
-/// Nats that the logs lose where something is missed: what comes in its place must explain as much.
-pub const MISSED: f64 = 20.0;
+        /// All of them.
+        pub static ALL: &[&Number] = &[$(&$name),*];
+    };
+}
 
-/// A kind without which the logs are less likely by no more than this, nats, is looked at again: what was chosen around it
-/// may have been chosen because of it.
-pub const DOUBTFUL: f64 = 60.0;
+numbers! {
+    // What an account must bring.
 
-// What noise does.
+    /// Twenty to one. A kind beyond calibration must bring as much, as about one arm in twenty has it; a rival that is less
+    /// likely by no more is a tie, and is named; an effect that is likelier than none by as much is called seen.
+    TWENTY_TO_ONE = 3.0, "nats";
 
-/// Standard deviations up to which what is left is noise (Huber 1964): rows beyond count less, and so does what is borne at
-/// rest.
-pub const OUTLIER: f64 = 3.0;
+    /// What a law outside the catalogue must bring: it is to be rarer than any effect.
+    PRICE_OF_OUTSIDE = 5.0, "nats";
 
-/// Beyond this multiple of that, the weight of a row falls with the square.
-pub const FAR_OUT: f64 = 2.0;
+    /// What an odd account must bring: some links off while others are right, where one may have been wrong in the URDF or
+    /// all are a little; a spring or play beside its rotor, on either side of the gear, the best of some hundred tries; what
+    /// hardly moves a joint, or comes where nothing is missed.
+    PRICE_OF_ODD = 20.0, "nats";
 
-/// Degrees of freedom of what is left: so heavy are its tails that neither a glitch nor a blow decides.
-pub const FREEDOM: f64 = 4.0;
+    // How well things are known.
 
-/// No law is exact to better than this part of the torque that it explains.
-pub const LAW_EXACT_TO: f64 = 0.003;
+    /// No law is exact to better than this part of the torque that it explains, and no drive's torque is known to better.
+    EXACT_TO = 0.003, "part of the effort";
 
-/// Part of a joint's effort that is nobody's concern: what sampling and integration leave.
-pub const UNNOTICED: f64 = 1e-3;
+    /// What sampling and integration leave.
+    UNNOTICED = 1e-3, "part of the effort";
 
-/// Part of a joint's effort that the gap is taken for, at least, where coefficients are given their spread by it.
-pub const LEAST_GAP: f64 = 0.01;
+    /// A gap that is nobody's concern.
+    IMMATERIAL = 0.01, "part of the effort";
 
-/// What the divergence of a link from the URDF counts, nats: so little that it moves what logs determine by nothing, enough
-/// that what they do not determine stays a body.
-pub const BODIES_PULL: f64 = 0.01;
+    /// What a law makes of noise, and how much of a delay and how much of a lag a drive is, is known to this part: it is
+    /// neither white, nor one of the two exactly.
+    KNOWN_TO = 0.15, "part";
 
-/// What a law makes of noise is known to this part: how much of it is the position's and how much the effort's, how white.
-pub const FILTER_KNOWN_TO: f64 = 0.15;
+    /// The noise floor is known to this factor: it is an estimate itself. A gap above it is more than noise, and its joint worth
+    /// a look; a gap below it by as much was not there to begin with.
+    FLOOR_KNOWN_TO = 1.3, "factor";
 
-/// No drive is a delay or a lag exactly: standard error, at least, of the part of their difference that is left.
-pub const LATE_KNOWN_TO: f64 = 0.15;
+    // What noise does.
 
-/// Nats, at most, by which what a delay and a lag leave speaks for one of them: noise is in it, and turns the balance at best.
-pub const HINT: f64 = 1.0;
+    /// Up to here what is left is noise (Huber 1964): rows beyond count less, and so does what is borne at rest; a joint that
+    /// leaves more of its floor than this is no chance of one among many.
+    OUTLIER = 3.0, "standard deviations";
 
-/// Part of its square that noise may have of the torque by which a delay is told from a lag: a servo answers to the noise of
-/// the position, and that answer is in what is left as well.
-pub const NOISE_IN_INSTRUMENT: f64 = 0.01;
+    /// Beyond this multiple of that, the weight of a row falls with the square.
+    FAR_OUT = 2.0, "factor";
 
-/// A servo's answer to the noise of the position, over the torque that this noise makes of the motion: up to so many times, as
-/// standard deviation of what it may do to the part of the difference between a delay and a lag. Measured: 8 to 19.
-pub const SERVO_ANSWERS: f64 = 10.0;
+    /// Beyond any doubt, also as the best of a hundred tries: a row that stands out, a drive that is not rigid, a torque that is
+    /// no artefact of its noise, an experiment that parts two accounts.
+    CLEAR = 5.0, "standard deviations";
 
-/// A torque this many times its noise is no artefact of it: a limit of a drive may cut it.
-pub const CLEAR_OF_NOISE: f64 = 8.0;
+    /// Of the distribution of what is left: its tails are so heavy that neither a glitch nor a blow decides.
+    FREEDOM = 4.0, "degrees of freedom";
 
-// Motors that turn on their own.
+    /// An account that does not feel this part of a touch of the effort does not predict the effort there.
+    FELT = 0.05, "part";
 
-/// What is left of a joint is more than noise from this multiple of its floor on: its drive is worth a look.
-pub const WORTH_A_LOOK: f64 = 1.3;
+    // Motors that turn on their own.
 
-/// A drive is not rigid where over the blocks of time that tell, the logarithm of what an account of it leaves is less by so
-/// many standard errors (a burst of chatter is one block, and counts no more than its logarithm), ...
-pub const NOT_RIGID: f64 = 1.0;
+    /// A drive is not rigid where an account of it leaves this part of the mean square, or less: in all, or of the blocks of
+    /// time in the mean of logarithms, as a burst of chatter is one block.
+    NOT_RIGID_LEAVES = 0.85, "part of the square";
 
-/// ... and this part of the mean square, or less.
-pub const NOT_RIGID_LEAVES: f64 = 0.85;
+    /// Part of the noise below which what is left of a block of time is as good as nothing: play may show in few of them.
+    BLOCK_OF_NOISE = 0.25, "part of the square";
 
-/// Part of the noise below which what is left of a block of time is as good as nothing: play may show in few of them.
-pub const BLOCK_OF_NOISE: f64 = 0.25;
+    /// A rotor lighter than this would not show.
+    LIGHTEST_ROTOR = 0.05, "part of the inertia that it turns";
 
-/// So many blocks of time must show something at all: a joint that its load holds on one side may cross its play once or twice.
-pub const BLOCKS_THAT_TELL: usize = 2;
+    // What to say.
 
-/// A rotor lighter than this part of what it turns would not show.
-pub const LIGHTEST_ROTOR: f64 = 0.05;
+    /// A gap over this matters, however much larger it was before.
+    MATERIAL_GAP = 0.1, "part of the effort";
 
-/// Standard errors from a rigid drive up to which the drive may be rigid: what the best of the hundred tries at each joint
-/// finds in noise, and what [`PRICE_OF_TURNING`] asks before any log is seen, k²/2 = 13 nats.
-pub const MAY_BE_RIGID: f64 = 5.0;
+    /// Effects explain the gap if they leave less than this above the floor: about a twentieth of the gap.
+    EXPLAINED = 0.003, "part of the square";
 
-// Pushes and rests.
+    /// A network predicts less than this of noise, held out: what it predicts by chance, several times.
+    PREDICTED = 0.05, "part of the square";
 
-/// A row stands out if the rest, over the spread of the calm half of all rows, has this root mean square over the joints.
-pub const STANDS_OUT: f64 = 5.0;
+    /// Spread of the mean squares of seconds over what noise of the same correlation has. Of a minute it is 1 ± 0.2; a spot
+    /// that rubs, chatter and the edges of friction have 4 to 10.
+    UNEVEN = 2.0, "factor";
 
-/// What stands out for longer than this part of the logs is no incident.
-pub const NO_INCIDENT: f64 = 0.6;
+    /// Rows that noise is correlated over, at most, as squares: 0.4 s at the usual cut-off. Drift is remembered longer.
+    REMEMBERED = 10.0, "rows";
 
-/// Standard error of the part of a force that is there from which on a row says nothing of it.
-pub const UNCLEAR: f64 = 0.25;
+    /// Power of the explained part of the gap by which confidence falls: what leaves much of the gap may be the nearest thing
+    /// that the catalogue has to a cause that it has not.
+    MISFIT = 4.0, "exponent";
 
-/// Part of a fold that a joint must rest for its rests to tell: the blows of other joints would outweigh few of them.
-pub const RESTS: f64 = 0.1;
+    /// Effects that are there of those named beside a rest so large that nothing speaks for them, measured on withheld cases:
+    /// laws that nobody has thought of look like those in the catalogue at times. Such an effect could be.
+    LEAST_THERE = 0.45, "part";
 
-// What to say.
+    /// Effects that are there of those named beyond doubt, measured on withheld cases.
+    MOST_THERE = 0.98, "part";
 
-/// Fewer rows than this tell nothing.
-pub const LEAST_ROWS: usize = 50;
+    /// Logs determine a sum of bodies whose interval is narrower than this part of the one that it had before them.
+    DETERMINED = 0.5, "part";
+}
 
-/// A gap under this multiple of the noise floor is noise, as far as the estimate of the floor can tell.
-pub const NEAR_FLOOR: f64 = 1.5;
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// A gap under this part of the effort's variation is nobody's concern.
-pub const IMMATERIAL_GAP: f64 = 0.01;
+    #[test]
+    fn a_number_is_turned_and_turned_back() {
+        let number = Number::new("X", "m", 3.0);
+        number.turn(0.5);
+        assert_eq!(number.get(), 1.5);
+        number.turn(1.0);
+        assert_eq!(number.get(), 3.0);
+    }
 
-/// A gap over this part of the effort's variation matters, however much larger it was before.
-pub const MATERIAL_GAP: f64 = 0.1;
-
-/// Effects explain the gap if they leave less than this part of its square above the floor: about a twentieth of the gap.
-pub const EXPLAINED: f64 = 0.003;
-
-/// One joint alone leaves more than noise at this multiple of its floor: any of them may, by chance or by what smoothing makes
-/// of a law, ...
-pub const ALONE: f64 = 3.0;
-
-/// ... and this part of its effort: the torque of one drive is hardly known to better than half of that.
-pub const ALONE_GAP: f64 = 0.02;
-
-/// A network predicts less of noise than this part of its square, held out: what it predicts of noise by chance, several times.
-pub const PREDICTED: f64 = 0.05;
-
-/// Spread of the mean squares of seconds over what noise of the same correlation has. Of a minute it is 1 ± 0.2; a spot that
-/// rubs, chatter and the edges of friction have 4 to 10.
-pub const UNEVEN: f64 = 2.0;
-
-/// Rows that noise is correlated over, at most, as squares: 0.4 s at the usual cut-off. Drift is remembered longer.
-pub const REMEMBERED: f64 = 10.0;
-
-/// A gap below this multiple of the floor is at the floor: below one, because the floor is an estimate itself.
-pub const AT_FLOOR: f64 = 0.8;
-
-/// A rival as likely as this is named beside the choice.
-pub const WORTH_NAMING: f64 = 0.01;
-
-/// Power of the explained part of the gap by which confidence falls: what leaves much of the gap may be the nearest thing
-/// that the catalogue has to a cause that it has not.
-pub const MISFIT: i32 = 4;
-
-/// Effects that are there, of those named beside a rest so large that nothing speaks for them, and of those named beyond
-/// doubt, measured on withheld cases: laws that nobody has thought of look like those in the catalogue at times.
-pub const THERE: (f64, f64) = (0.45, 0.98);
-
-/// Confidence of an effect that a fault of the data would explain as well: it could be.
-pub const COULD_BE: f64 = 0.45;
-
-/// Logs determine a sum of bodies whose interval is narrower than this part of the one that it had before them.
-pub const DETERMINED: f64 = 0.5;
-
-/// Accounts that lie fewer standard errors apart than this may still be confused.
-pub const SEPARATED: f64 = 6.0;
+    #[test]
+    fn there_are_25_and_each_has_a_name_and_a_unit_of_its_own() {
+        assert_eq!(ALL.len(), 25);
+        assert!(ALL.iter().all(|n| !n.unit.is_empty() && n.get() > 0.0));
+        let mut names: Vec<&str> = ALL.iter().map(|n| n.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), 25);
+    }
+}

@@ -18,7 +18,7 @@ impl Known {
             c.shape == 0.0
                 && c.kind.card().turned_by_tangent().is_none()
                 && !c.kind.card().reads_found
-                && !c.kind.card().of_its_log
+                && !c.kind.card().of_its_log()
         };
         let mut candidates = Candidate::all(model);
         candidates.retain(|c| stays(c) && c.joints.iter().all(|&j| moving[j]));

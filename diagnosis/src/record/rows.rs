@@ -42,7 +42,7 @@ pub fn weights_of_concern(model: &Model, signals: &[Signals], moving: &[bool]) -
         let all = || signals.iter().flat_map(|s| s.tau[j].iter());
         (all().map(|t| t * t).sum::<f64>() / all().count().max(1) as f64).sqrt()
     };
-    let of = |(j, limit): (usize, f64)| if moving[j] { 1.0 / size(j).hypot(UNNOTICED * limit) } else { 0.0 };
+    let of = |(j, limit): (usize, f64)| if moving[j] { 1.0 / size(j).hypot(UNNOTICED.get() * limit) } else { 0.0 };
     limits.enumerate().map(of).map(|w| if w.is_finite() { w } else { 0.0 }).collect()
 }
 

@@ -3,7 +3,7 @@
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
 use crate::fit::terms::Entry;
-use crate::numbers::decide::PRICE_OF_TURNING;
+use crate::numbers::decide::PRICE_OF_ODD;
 use crate::record::data::Data;
 use crate::search::climb;
 use crate::search::climb::{Choice, Competition};
@@ -57,7 +57,7 @@ impl Chosen {
 
     /// Log probability of the account before any log is seen.
     pub(crate) fn prior(&self) -> f64 {
-        let drive = if self.turns() { PRICE_OF_TURNING + (self.noise.len() as f64).ln() } else { 0.0 };
+        let drive = if self.turns() { PRICE_OF_ODD.get() + (self.noise.len() as f64).ln() } else { 0.0 };
         Competition::new(&self.all).prior(&self.choice.set) - drive
     }
 

@@ -5,7 +5,7 @@
 //! A climb adds, drops and exchanges candidates while the score rises, from nothing and from the whole calibration.
 
 use crate::fit::problem::{Problem, Score, Solved};
-use crate::numbers::decide::{MATERIAL, MISSED, PRICE_OF_OUTSIDE, PRICE_OF_SOME_LINKS, TWENTY_TO_ONE};
+use crate::numbers::decide::{EXACT_TO, PRICE_OF_ODD, PRICE_OF_OUTSIDE, TWENTY_TO_ONE};
 use crate::record::band::Band;
 use gapscope_effects::Kind;
 use rayon::prelude::*;
@@ -29,7 +29,7 @@ pub struct Choice {
 
 /// Whether some joint is left less by as much as concerns anyone: mean squares of what two accounts leave of each, (N m)² or N².
 pub fn is_material(problem: &Problem, without: &[f64], with: &[f64]) -> bool {
-    let moved = |j: usize| without[j] - with[j] > (MATERIAL * problem.scale[j]).powi(2);
+    let moved = |j: usize| without[j] - with[j] > (EXACT_TO.get() * problem.scale[j]).powi(2);
     (0..with.len()).any(moved)
 }
 
@@ -117,11 +117,11 @@ impl<'a> Competition<'a> {
                 let of_kind: Vec<usize> = set.iter().copied().filter(|&c| self.kind(c) == kind).collect();
                 let (places, used) = (self.places[of_kind[0]].0, of_kind.len());
                 let rare = match kind {
-                    kind if kind.is_outside() => PRICE_OF_OUTSIDE,
+                    kind if kind.is_outside() => PRICE_OF_OUTSIDE.get(),
                     kind if kind.is_calibration() => 0.0,
-                    _ => TWENTY_TO_ONE,
+                    _ => TWENTY_TO_ONE.get(),
                 };
-                let few = if kind.card().described && used > 1 && used < places { PRICE_OF_SOME_LINKS } else { 0.0 };
+                let few = if kind.card().described && used > 1 && used < places { PRICE_OF_ODD.get() } else { 0.0 };
                 let shapes: f64 = of_kind.iter().map(|&c| (self.places[c].1 as f64).ln()).sum();
                 -(rare + few + shapes + (places as f64).ln() + ln_choose(places, used))
             })
@@ -154,7 +154,7 @@ impl<'a> Competition<'a> {
             let rest = self.without(&set, |c| self.kind(c) == kind);
             let Some(without) = score.solve(&self.problem.columns(&rest)) else { continue };
             let moves = is_material(self.problem, &score.left_by(&without), &left);
-            if !moves && without.far() - with.far() < MISSED {
+            if !moves && without.far() - with.far() < PRICE_OF_ODD.get() {
                 set = rest;
             }
         }

@@ -1,9 +1,10 @@
 //! When something outside pushed: stretches of time in which the torque leaves what any law of the robot gives.
 
-use crate::numbers::decide::{NO_INCIDENT, STANDS_OUT, UNCLEAR};
+use crate::numbers::decide::CLEAR;
 use crate::record::band::Band;
 use crate::record::rows::Rows;
 use crate::record::signals::Signals;
+use gapscope_effects::Pushes;
 
 /// First quartile of the size of a standard normal number.
 const QUARTER: f64 = 0.3186;
@@ -57,18 +58,18 @@ fn spread(row: &[f64]) -> f64 {
 }
 
 /// The stretches of every episode, s since its start, in which what is left stands out of its noise.
-pub fn stretches(signals: &[Signals], band: &Band, left: &Left) -> Vec<Vec<[f64; 2]>> {
+pub fn stretches(signals: &[Signals], band: &Band, left: &Left, pushes: &Pushes) -> Vec<Vec<[f64; 2]>> {
     let height: Vec<f64> = (0..band.rows.len())
         .map(|i| {
             let square: f64 = left.told(i).map(|j| (left.rest[j][i] / left.noise[j][i]).powi(2)).sum();
             (square / left.told(i).count().max(1) as f64).sqrt()
         })
         .collect();
-    let outside = height.iter().filter(|h| **h > STANDS_OUT).count();
-    if outside as f64 > NO_INCIDENT * height.len() as f64 {
+    let outside = height.iter().filter(|h| **h > CLEAR.get()).count();
+    if outside as f64 > pushes.longest * height.len() as f64 {
         return vec![Vec::new(); signals.len()];
     }
-    above(signals, band, &height, STANDS_OUT, |inside| {
+    above(signals, band, &height, CLEAR.get(), |inside| {
         let mut sorted = inside.to_vec();
         sorted.sort_by(f64::total_cmp);
         EDGE * sorted[sorted.len() / 2]
@@ -77,12 +78,18 @@ pub fn stretches(signals: &[Signals], band: &Band, left: &Left) -> Vec<Vec<[f64;
 
 /// The stretches in which a force is there that would give some torque at each row if it were there `always`, by what is left
 /// of the torque without it: a matched filter over the joints, 1 where the force is there and 0 where it is not.
-pub fn of_one_force(signals: &[Signals], band: &Band, left: &Left, always: &Rows) -> Vec<Vec<[f64; 2]>> {
+pub fn of_one_force(
+    signals: &[Signals],
+    band: &Band,
+    left: &Left,
+    always: &Rows,
+    pushes: &Pushes,
+) -> Vec<Vec<[f64; 2]>> {
     let part: Vec<f64> = (0..band.rows.len())
         .map(|i| {
             let sum = |of: &dyn Fn(usize) -> f64| left.told(i).map(|j| of(j) / left.noise[j][i].powi(2)).sum::<f64>();
             let known = sum(&|j| always[j][i] * always[j][i]);
-            let clear = known > UNCLEAR.powi(-2);
+            let clear = known > pushes.unclear.powi(-2);
             if clear { sum(&|j| always[j][i] * left.rest[j][i]) / known } else { 0.0 }
         })
         .collect();
@@ -135,6 +142,8 @@ mod tests {
     use crate::fit::support::{fitted, torque};
     use gapscope_effects::Kind;
 
+    const PUSHES: Pushes = Pushes { longest: 0.6, unclear: 0.25 };
+
     /// The push is as large as the noise of a joint; friction at rest could be anything.
     #[test]
     fn one_force_is_found_by_all_joints_together_and_not_where_friction_holds() {
@@ -151,13 +160,13 @@ mod tests {
             .map(|j| (0..rows).map(|i| if pushes(i) { always[j][i] } else { 0.0 } + wave(i + j)).collect())
             .collect();
         let moving = vec![vec![0.0; rows]; 2];
-        let found = of_one_force(&signals, &band, &Left::new(rest.clone(), &moving, &[0.0; 2]), &always);
+        let found = of_one_force(&signals, &band, &Left::new(rest.clone(), &moving, &[0.0; 2]), &always, &PUSHES);
         let [[from, to]] = found[1].as_slice() else { panic!("{found:?}") };
         assert!((from - 2.0).abs() < 0.04 && (to - 3.0).abs() < 0.04, "{found:?}");
         assert!(found[0].is_empty() && found[2].is_empty(), "{found:?}");
         // At rest, friction of ten times the force would hold it.
         let still = vec![vec![1.0; rows]; 2];
-        let held = of_one_force(&signals, &band, &Left::new(rest, &still, &[9.0, 7.0]), &always);
+        let held = of_one_force(&signals, &band, &Left::new(rest, &still, &[9.0, 7.0]), &always, &PUSHES);
         assert!(held.iter().all(Vec::is_empty), "{held:?}");
     }
 }

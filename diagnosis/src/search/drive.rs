@@ -11,7 +11,7 @@ mod choice;
 mod least;
 mod left;
 
-use crate::numbers::decide::{LIGHTEST_ROTOR, MAY_BE_RIGID, UNNOTICED};
+use crate::numbers::decide::{CLEAR, LIGHTEST_ROTOR, UNNOTICED};
 pub(crate) use least::Least;
 use left::{beyond_doubt, dot, mean, mean_square, noisier, tells};
 
@@ -181,7 +181,7 @@ impl<'a> Study<'a> {
             })
             .collect();
         let effort = mean(&logs.signals.iter().map(|s| mean_square(&s.tau[joint])).collect::<Vec<_>>());
-        study.unnoticed = UNNOTICED * UNNOTICED * effort;
+        study.unnoticed = UNNOTICED.get() * UNNOTICED.get() * effort;
         study.rigid = study.rigid_in(View::default());
         study.rotor = study.turn(rigid, study.rotor).1;
         study.rigid = study.rigid_in(View::default());
@@ -229,7 +229,7 @@ impl<'a> Study<'a> {
                 let measure = self.measure(&drive, rotor);
                 // A drive that may be rigid is another account's, and so is a gap that no gear has.
                 let drive = Candidate { knob_error: self.error(&drive, rotor), ..drive };
-                if drive.errors_from_rigid() < MAY_BE_RIGID || drive.shape > turning.widest {
+                if drive.errors_from_rigid() < CLEAR.get() || drive.shape > turning.widest {
                     continue;
                 }
                 if best.as_ref().is_none_or(|(least, ..)| measure < *least) {
@@ -250,7 +250,7 @@ impl<'a> Study<'a> {
     /// Whether a rotor is heavy enough for its drive to show. A link without inertia about its joint has no drive that turns
     /// on its own: some URDFs have such last links.
     fn shows(&self, rotor: f64) -> bool {
-        self.inertia > 0.0 && rotor > 1.1 * LIGHTEST_ROTOR * self.inertia
+        self.inertia > 0.0 && rotor > 1.1 * LIGHTEST_ROTOR.get() * self.inertia
     }
 
     /// The rotor with which a rigid drive leaves least, by least squares.
@@ -263,7 +263,7 @@ impl<'a> Study<'a> {
             }
         }
         let rotor = if square > 0.0 { product / square } else { 0.0 };
-        rotor.max(LIGHTEST_ROTOR * self.inertia)
+        rotor.max(LIGHTEST_ROTOR.get() * self.inertia)
     }
 
     /// Knob and rotor of a drive after some Gauss–Newton steps in compliance or gap, in which what is left is nearly linear;
@@ -294,7 +294,7 @@ impl<'a> Study<'a> {
             let Some(step) = gram.lu().solve(&moment).filter(|step| step.iter().all(|x| x.is_finite())) else { break };
             let bounded = |step: f64| 1.0 + step.clamp(-FARTHEST, FARTHEST);
             drive.shape *= bounded(step[0]).powf(power);
-            rotor = (rotor * bounded(step[1])).max(LIGHTEST_ROTOR * self.inertia);
+            rotor = (rotor * bounded(step[1])).max(LIGHTEST_ROTOR.get() * self.inertia);
         }
         (drive, rotor)
     }

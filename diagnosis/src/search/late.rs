@@ -6,7 +6,7 @@
 //! by the model, smoothed (instrumental variables; Söderström and Stoica, Instrumental Variable Methods for System
 //! Identification, 1983).
 
-use crate::numbers::decide::{HINT, LATE_KNOWN_TO, NOISE_IN_INSTRUMENT, SERVO_ANSWERS};
+use crate::numbers::decide::KNOWN_TO;
 use crate::record::data::Data;
 use crate::record::logs::{PART_OF_NOISE, Record};
 use crate::record::rows::{Rows, at_rows};
@@ -14,7 +14,7 @@ use crate::record::signals::Signals;
 use crate::search::chosen::Chosen;
 use crate::search::climb::Choice;
 use crate::search::noise::less;
-use gapscope_effects::{Candidate, EffectError};
+use gapscope_effects::{Candidate, EffectError, Late};
 
 /// Time constants of the lags that the torque may be smoothed by, once each way, s.
 const SMOOTHED_BY: [f64; 5] = [0.2, 0.1, 0.05, 0.025, 0.0125];
@@ -34,6 +34,7 @@ impl Record<'_> {
         let late = |c: &usize| chosen.all.entries[*c].candidate.kind.card().is_late();
         let Some(at) = chosen.choice.set.iter().position(late) else { return Ok(chosen) };
         let law = &chosen.exact.entries[at].candidate;
+        let Some(told) = law.kind.card().late else { return Ok(chosen) };
         let far = |c: usize| (chosen.all.entries[c].candidate.shape - law.shape).abs();
         let other = (0..chosen.all.entries.len())
             .filter(|c| late(c) && chosen.all.entries[*c].candidate.kind != law.kind)
@@ -45,8 +46,8 @@ impl Record<'_> {
         let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
         let rival = chosen.with(Choice { set }, exact, fit);
         // What they leave counts as a hint: noise is in it.
-        let hint = rival.odds_against(&chosen, self)?.clamp(-HINT, HINT);
-        let odds = self.odds_of_the_second([&chosen, &rival])? + hint;
+        let hint = rival.odds_against(&chosen, self)?.clamp(-told.hint, told.hint);
+        let odds = self.odds_of_the_second([&chosen, &rival], &told)? + hint;
         let (mut likelier, lost) = if odds <= 0.0 { (chosen, other) } else { (rival, lost) };
         // What was decided here no climb turns round.
         likelier.all.closed.push(likelier.all.entries[lost].candidate.kind);
@@ -55,7 +56,7 @@ impl Record<'_> {
     }
 
     /// By how many nats the second of two accounts that differ by a delay and a lag is likelier.
-    fn odds_of_the_second(&self, accounts: [&Chosen; 2]) -> Result<f64, EffectError> {
+    fn odds_of_the_second(&self, accounts: [&Chosen; 2], told: &Late) -> Result<f64, EffectError> {
         let law =
             |of: &Chosen| of.exact.entries.iter().map(|e| &e.candidate).find(|c| c.kind.card().is_late()).cloned();
         let [Some(first), Some(second)] = accounts.map(law) else { return Ok(0.0) };
@@ -68,7 +69,8 @@ impl Record<'_> {
         };
         // Each joint counts by what is left of it.
         let sizes: Vec<f64> = (0..n).map(size).collect();
-        let Instrument { rows: instrument, noise } = self.instrument(accounts[0], [&first, &second], &sizes)?;
+        let Instrument { rows: instrument, noise } =
+            self.instrument(accounts[0], [&first, &second], &sizes, told.noise_in_instrument)?;
         let mut sums = vec![(0.0, 0.0); self.band.blocks];
         for (j, size) in sizes.iter().enumerate().filter(|(_, size)| **size > 0.0) {
             for (i, row) in self.band.rows.iter().enumerate() {
@@ -88,13 +90,19 @@ impl Record<'_> {
         } else {
             0.0
         };
-        Ok(odds_of_the_second(&sums, SERVO_ANSWERS * answered))
+        Ok(odds_of_the_second(&sums, told.servo_answers * answered))
     }
 
     /// What the first of two laws makes of the torque that the motion takes less what the second does, at the rows of the band.
     /// The torque is smoothed until noise is a small part of that. What a little more or less of the delay would change is
-    /// taken out: noise shifts both laws.
-    fn instrument(&self, of: &Chosen, laws: [&Candidate; 2], sizes: &[f64]) -> Result<Instrument, EffectError> {
+    /// taken out: noise shifts both laws. `most_noise` is the part of noise in the square.
+    fn instrument(
+        &self,
+        of: &Chosen,
+        laws: [&Candidate; 2],
+        sizes: &[f64],
+        most_noise: f64,
+    ) -> Result<Instrument, EffectError> {
         let n = self.model.dof();
         let taken = |signals: &[Signals]| Data { signals, ..self.data(&of.noise) }.loaded(&of.exact, &of.fit);
         let (plain, noisier) = (taken(&self.signals)?, taken(&self.noisier)?);
@@ -113,7 +121,7 @@ impl Record<'_> {
             if known && !instrument.rows.is_empty() {
                 let noise = less_rows(&shaken, &next);
                 let part = dot(&noise, &noise, sizes) / dot(&next, &next, sizes) / PART_OF_NOISE.powi(2);
-                if part > NOISE_IN_INSTRUMENT {
+                if part > most_noise {
                     break;
                 }
             }
@@ -146,7 +154,7 @@ fn odds_of_the_second(blocks: &[(f64, f64)], answered: f64) -> f64 {
     let error = (spread + answered * answered).sqrt() / between.abs();
     // What lies beyond both laws shows by how much they are off.
     let beyond = part - part.clamp(0.0, 1.0);
-    (2.0 * part - 1.0) / (2.0 * error.hypot(LATE_KNOWN_TO).max(beyond.abs()).powi(2))
+    (2.0 * part - 1.0) / (2.0 * error.hypot(KNOWN_TO.get()).max(beyond.abs()).powi(2))
 }
 
 /// A torque through a lag, once each way, so that nothing comes later.

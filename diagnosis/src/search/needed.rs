@@ -1,7 +1,6 @@
 //! What was chosen held against the best accounts without each of its kinds, at the exact law.
 
 use crate::fit::estimate::speeds;
-use crate::numbers::decide::DOUBTFUL;
 use crate::record::logs::{Progress, Record};
 use crate::search::chosen::Chosen;
 use crate::search::climb;
@@ -12,6 +11,10 @@ use gapscope_effects::EffectError;
 
 /// Times that a likelier account takes the place of what was chosen.
 const AGAIN: usize = 2;
+/// A kind without which the logs are less likely by no more than this, nats, is looked at again: what was chosen around it may
+/// have been chosen because of it. More of it takes more time.
+const DOUBTFUL: f64 = 60.0;
+
 impl Record<'_> {
     /// The likeliest account: where the best one without a kind is likelier than what was chosen, that one.
     pub(crate) fn likeliest(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {

@@ -5,7 +5,8 @@
 //! logged (the Jacobian of a change of variables). So each account runs a second time with some noise more; where one makes
 //! more of it than the other, what it leaves is scaled down to what the other makes of it, frequency by frequency.
 
-use crate::numbers::decide::FILTER_KNOWN_TO;
+use crate::numbers::decide::{FELT, KNOWN_TO};
+use crate::numbers::kernel::Kernel;
 use crate::record::data::Data;
 use crate::record::frequency::{BANDS, Equalizer, in_frequency};
 use crate::record::logs::PART_OF_NOISE;
@@ -18,8 +19,8 @@ use gapscope_effects::EffectError;
 
 /// Part of what is left by which the effort is touched to see whether an account feels it: so little that no contact changes.
 const TOUCH: f64 = 1e-4;
-/// Part of a touch that is felt at least where an account predicts the effort.
-const FELT: f64 = 0.05;
+/// Half-width of the kernel that leaves of an account's residual what lies in the band, s: half a row.
+const IN_BAND: f64 = 0.02;
 /// Rows to either side over which that is looked at.
 const NEAR: usize = 1;
 
@@ -44,7 +45,7 @@ impl Levels {
         // In doubt for the account without the law.
         let (more, doubt) = match filters {
             [true, false] => (bounded.min(more), 0.0),
-            [false, true] => (bounded.max(more), bounded.max(more).abs().min(FILTER_KNOWN_TO)),
+            [false, true] => (bounded.max(more), KNOWN_TO.get() * bounded.max(more).abs()),
             _ => (bounded, 0.0),
         };
         // The noise of the position is known. What leaves less than it must is no better for that: a light link that jumps in a
@@ -77,8 +78,10 @@ impl Record<'_> {
             let position = size(&less(&of_position[more][j], &plain[more][j]));
             let part = if left(more) > 0.0 { (1.0 - (position / left(more)).powi(2)).max(0.0).sqrt() } else { 0.0 };
             for (s, rest) in noisier.iter_mut().zip(accounts[more].1) {
-                let backwards = rest[j].iter().rev();
-                s.tau[j].iter_mut().zip(backwards).for_each(|(tau, rest)| *tau += PART_OF_NOISE * part * rest);
+                // What lies beyond the band is the noise of the position for the most part.
+                let backwards: Vec<f64> = rest[j].iter().rev().copied().collect();
+                let backwards = in_band(&backwards, s.dt);
+                s.tau[j].iter_mut().zip(&backwards).for_each(|(tau, rest)| *tau += PART_OF_NOISE * part * rest);
             }
         }
         let moved = |i: usize| -> Result<Vec<[f64; BANDS]>, EffectError> {
@@ -126,7 +129,7 @@ impl Record<'_> {
             let near = |x: &[f64], i: usize| -> f64 {
                 x[i.saturating_sub(NEAR)..(i + NEAR + 1).min(x.len())].iter().map(|x| x * x).sum()
             };
-            (0..felt.len()).map(|i| near(&felt, i) < FELT * FELT * near(&touched, i)).collect()
+            (0..felt.len()).map(|i| near(&felt, i) < FELT.get().powi(2) * near(&touched, i)).collect()
         };
         let then = Data { signals: &moved, ..self.data(&chosen.noise) }.rest(&chosen.exact, &chosen.fit)?;
         Ok((0..self.model.dof()).map(|j| of(j, &then)).collect())
@@ -156,6 +159,13 @@ impl Record<'_> {
             levels.iter().sum::<f64>() / levels.len().max(1) as f64
         })
     }
+}
+
+/// A signal without what lies far beyond the band.
+fn in_band(x: &[f64], dt: f64) -> Vec<f64> {
+    let kernel = Kernel::new(IN_BAND, dt);
+    let at = |k: usize| x[k.saturating_sub(kernel.reach).min(x.len() - 1)];
+    (0..x.len()).map(|k| kernel.value.iter().enumerate().map(|(i, w)| w * at(k + i)).sum()).collect()
 }
 
 /// Differences, row by row.
@@ -190,7 +200,10 @@ mod tests {
         assert_eq!(factor([1.0, 2.0], [1.0, 2.0], [true, true]), 1.0, "and never up");
         // A rigid drive beside a spring that filters noise, both louder than they leave: in doubt it is nearer still.
         let rigid = factor([1.0, 0.7], [1.4, 1.0], [false, true]);
-        assert!((rigid - (-FILTER_KNOWN_TO).exp() / 1.4).abs() < 1e-9, "{rigid}");
+        assert!((rigid - 1.4f64.powf(-1.0 - KNOWN_TO.get())).abs() < 1e-9, "{rigid}");
+        // A short lag makes next to nothing of noise: there is next to no doubt.
+        let plain = factor([1.0, 0.97], [1.001, 1.0], [false, true]);
+        assert!((plain - 1.0).abs() < 0.002, "{plain}");
     }
 
     #[test]

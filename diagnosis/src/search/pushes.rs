@@ -29,6 +29,7 @@ impl Record<'_> {
     /// Marks the stretches of time that stand out of what the commonest candidates leave.
     pub(crate) fn look_for_pushes(&mut self) -> Result<(), EffectError> {
         let n = self.model.dof();
+        let Some(pushes) = Kind::ALL.into_iter().find_map(|kind| kind.card().pushes) else { return Ok(()) };
         let nominal: Vec<Vec<Vec<f64>>> = self
             .signals
             .par_iter()
@@ -37,10 +38,10 @@ impl Record<'_> {
         let noise = noise_floor(&self.signals, &self.band, &nominal, n);
         let bare = rows::at_rows(&self.band, &nominal, n);
         let mut pushed =
-            contact::stretches(&self.signals, &self.band, &Left { noise: contact::noise(&bare), rest: bare });
+            contact::stretches(&self.signals, &self.band, &Left { noise: contact::noise(&bare), rest: bare }, &pushes);
         if pushed.iter().all(Vec::is_empty) {
             let left = self.left_beside_pushes(&noise).left;
-            pushed = contact::stretches(&self.signals, &self.band, &left);
+            pushed = contact::stretches(&self.signals, &self.band, &left, &pushes);
         }
         // What pushes and what the robot itself lacks are told apart by turns: both stand out of a nominal model.
         for look in 0..=LOOKS {
@@ -51,7 +52,7 @@ impl Record<'_> {
                 break;
             }
             let Beside { left, always, contacts } = self.left_beside_pushes(&noise);
-            pushed = contact::of_one_force(&self.signals, &self.band, &left, &always);
+            pushed = contact::of_one_force(&self.signals, &self.band, &left, &always, &pushes);
             self.contacts = contacts;
         }
         Ok(())
@@ -60,7 +61,7 @@ impl Record<'_> {
     /// The commonest candidates fitted beside the pushes known so far.
     fn left_beside_pushes(&self, noise: &[f64]) -> Beside {
         let kinds: Vec<Kind> =
-            Kind::ALL.into_iter().filter(|kind| kind.card().common || kind.card().of_its_log).collect();
+            Kind::ALL.into_iter().filter(|kind| kind.card().common || kind.card().of_its_log()).collect();
         let mut candidates = Candidate::all(self.model);
         candidates.retain(|c| c.kind.card().common);
         if self.signals.iter().any(|s| !s.pushed.is_empty()) {
@@ -70,7 +71,7 @@ impl Record<'_> {
         let problem = self.data(noise).problem(terms, &kinds);
         let theta = problem.robust();
         let n = self.model.dof();
-        let pushes = |e: &&Entry| e.candidate.kind.card().of_its_log;
+        let pushes = |e: &&Entry| e.candidate.kind.card().of_its_log();
         let holds_still = |e: &&Entry| e.candidate.kind.card().force == Some(Force::Dry);
         let mut holds = vec![0.0; n];
         for e in problem.entries.iter().filter(holds_still) {

@@ -1,7 +1,7 @@
 //! What could stand in the place of what was chosen.
 
 use crate::fit::problem::Problem;
-use crate::numbers::decide::MISSED;
+use crate::numbers::decide::PRICE_OF_ODD;
 use crate::search::climb::{Account, Choice, Competition, SHORTLIST, kinds, told_together};
 use gapscope_effects::Kind;
 use rayon::prelude::*;
@@ -67,7 +67,7 @@ pub fn swap(problem: &Problem, chosen: &Choice, gone: usize) -> Option<Rival> {
     let base = competition.without(&chosen.set, |c| c == gone);
     let solve = |set: &[usize]| best.score.solve(&problem.columns(set));
     let (own, missing) = (solve(&best.set)?, solve(&base)?);
-    if own.likeliest() - missing.likeliest() < MISSED {
+    if own.likeliest() - missing.likeliest() < PRICE_OF_ODD.get() {
         return None;
     }
     let other = |c: usize| competition.kind(c) != without && !competition.kind(c).is_outside();

@@ -15,7 +15,7 @@ impl Record<'_> {
         let rest = self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?;
         let bears = |c: usize| {
             let bears = |j: &usize| {
-                let beyond = OUTLIER * chosen.exact.sigma[*j];
+                let beyond = OUTLIER.get() * chosen.exact.sigma[*j];
                 self.at_rest(*j, &rest).into_iter().flatten().any(|x| x.abs() > beyond)
             };
             of(c).joints.iter().any(bears)

@@ -3,7 +3,7 @@
 //! τ_effective(t) = τ(t − delay), τ held between samples; a fraction of a sample is allowed.
 //! Source: Åström, Wittenmark, Computer-Controlled Systems (1997) (sampling a system with a time delay).
 
-use crate::card::{Card, Force, Gauge, LATE, LATE_EXACT_TO, LATE_SPREAD, Place, Size};
+use crate::card::{Card, Force, Gauge, LATE, LATE_EXACT_TO, LATE_SPREAD, Late, Place, Size};
 use crate::filter::{early, late};
 use crate::law::{Law, Listed, Signature, Value, check};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
@@ -45,7 +45,7 @@ impl Signature for ActuationDelay {
         place: Place::Robot,
         knob: Some(LATE),
         force: Some(Force::Late),
-        passes: Some(late),
+        late: Some(Late::told(late)),
         size: Size::Along(&[Gauge::along("delay", &[1.0])]),
         exact_to_samples: LATE_EXACT_TO,
         reads_found: true,

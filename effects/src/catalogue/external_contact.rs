@@ -4,7 +4,7 @@
 //! that is nobody knows to a centimetre, nor where the centre of mass of a used link is.
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 7.2 (contact forces in joint space).
 
-use crate::card::{Apart, Card, Place};
+use crate::card::{Apart, Card, Place, Pushes};
 use crate::law::{Law, Listed, Signature, Value, check};
 use crate::plant::Contact;
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
@@ -84,7 +84,7 @@ impl Signature for ExternalContact {
         place: Place::Leaf,
         apart: Apart::By(4, "log again with nothing touching the robot"),
         weighs: true,
-        of_its_log: true,
+        pushes: Some(Pushes { longest: 0.6, unclear: 0.25 }),
         ..Card::BLANK
     };
 

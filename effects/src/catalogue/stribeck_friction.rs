@@ -3,7 +3,7 @@
 //! M q̈ + C q̇ + g = τ − [f + (s − f) e^{−(q̇/v)²}] sign q̇ in motion; at rest any force in [−s, s] that keeps the joint at rest.
 //! Source: Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7) 1994, section 2 (Stribeck curve; here with exponent 2).
 
-use crate::card::{Card, FIVEFOLD, FRICTION_EXACT_TO, Force, Gauge, Grid, Knob, Size};
+use crate::card::{Card, FIVEFOLD, FRICTION_EXACT_TO, Force, Gauge, Grid, Knob, Rests, Size};
 use crate::law::{AtRest, Law, Listed, Signature, Value, check, per_joint, value_at};
 use crate::motion::soft_sign;
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
@@ -72,7 +72,7 @@ impl Signature for StribeckFriction {
         force: Some(Force::Dry),
         size: Size::Along(&[Gauge { beside_others: true, ..Gauge::along("static", &[0.0, 1.0]) }]),
         exact_to: FRICTION_EXACT_TO,
-        at_rest: Some(["coulomb", "static"]),
+        rests: Some(Rests { sliding: "coulomb", at_rest: "static", least: 0.1, well_below: 0.98, spreads: 3.0 }),
         ..Card::BLANK
     };
 

@@ -65,16 +65,16 @@ fn a_card_makes_effects_of_its_own_kind_with_the_parameters_that_it_names() {
             Size::PointMass(parameter) | Size::Knob(parameter, _) => vec![parameter],
             Size::Unasked => vec![],
         };
-        assert!(!sizes.is_empty() || card.turning.is_some() || card.of_its_log, "{kind}: no size");
+        assert!(!sizes.is_empty() || card.turning.is_some() || card.of_its_log(), "{kind}: no size");
         let asked = sizes.into_iter().chain(card.turning.map(|turning| turning.parameter.0));
-        for parameter in asked.chain(card.at_rest.into_iter().flatten()) {
+        for parameter in asked.chain(card.rests.iter().flat_map(|rests| [rests.sliding, rests.at_rest])) {
             assert!(names.contains(&parameter), "{kind} has no `{parameter}`, but {names:?}");
         }
         // One joint's value does not stand in the way of another's.
         let again = effect.clone().absorb(effect.clone());
         let by_joint = effect.law().parameters().iter().all(|value| value.joint.is_some());
         assert_eq!(again.is_none(), by_joint, "{kind}: a value a joint is taken in, and nothing else");
-        assert_eq!(effect.clone().at_rest().is_some(), card.at_rest.is_some(), "{kind}");
+        assert_eq!(effect.clone().at_rest().is_some(), card.rests.is_some(), "{kind}");
     }
 }
 
@@ -128,7 +128,7 @@ fn kinds_exclude_each_other_alike_and_name_others_rightly() {
         assert!(all().all(|other| kind.excludes(other) == other.excludes(kind)), "{kind}");
         assert!(kind.excludes(kind), "{kind}");
         // What takes its place at rest is another account of the same force, and knows rest.
-        assert!(card.sticks_as.is_none_or(|other| kind.excludes(other) && other.card().at_rest.is_some()), "{kind}");
+        assert!(card.sticks_as.is_none_or(|other| kind.excludes(other) && other.card().rests.is_some()), "{kind}");
         assert!(!matches!(card.apart, Apart::From(other, _) if other == kind), "{kind}");
     }
     assert!(Kind::CoulombFriction.excludes(Kind::StribeckFriction));

@@ -8,6 +8,7 @@ mod actuation;
 mod drive;
 mod elements;
 mod friction;
+mod hold;
 mod jacobian;
 mod residual;
 mod state;

@@ -2,15 +2,12 @@
 
 use super::{Direction, Plant};
 use crate::Motion;
-use crate::filter::{bristle, early, first_order, late, smoothed};
+use crate::filter::{bristle, early, first_order, late};
 use crate::motion::mean_size;
 use crate::wind_up::{Coupling, Drag, JointRun, Oscillator, WindUp, inertia_about, slope_about};
 
 /// Steps of Newton's method towards an effort that friction under load grows with; it is a contraction.
 const LOAD_STEPS: usize = 4;
-/// Half-width of the mean by which a joint at rest is told to hold or to slip, s: the noise of its acceleration, sample by
-/// sample, may exceed all that its friction holds.
-const HOLDS_OVER: f64 = 0.04;
 
 /// What one sample needs to know beyond itself.
 #[derive(Default)]
@@ -236,7 +233,8 @@ impl Plant {
             }
             out.iter_mut().zip(&rest).for_each(|(out, rest)| out.push(*rest));
         }
-        self.hold(motion, tau, turning, &mut out, &mut dry);
+        let open: Vec<usize> = turning.iter().map(|drive| drive.joint).collect();
+        self.hold(motion, tau, &open, &mut out, &mut dry);
         // Dry friction jumps as the speed changes sign; the signals about that are smooth.
         for (j, (out, dry)) in
             out.iter_mut().zip(&dry).enumerate().filter(|(_, (_, dry))| dry.iter().any(|f| *f != 0.0))
@@ -248,31 +246,6 @@ impl Plant {
             }
         }
         out
-    }
-
-    /// Friction of joints at rest, once more: sample by sample it would hold what noise takes off the needed torque, and leave
-    /// what noise adds. A joint that slips at its greatest friction would leave the mean size of that noise.
-    fn hold(&self, motion: &Motion, tau: &[Vec<f64>], turning: &[Turning], out: &mut [Vec<f64>], dry: &mut [Vec<f64>]) {
-        let mut delivered = vec![0.0; out.len()];
-        for direction in &self.directions {
-            let &[(j, _)] = direction.parts.as_slice() else { continue };
-            let others = self.directions.iter().any(|d| d.parts.len() > 1 && d.parts.iter().any(|(of, _)| *of == j));
-            let open = turning.iter().any(|drive| drive.joint == j) || self.bristles.iter().any(|b| b.joint == j);
-            let rests = |k: &usize| motion.v[j][*k].abs() < motion.standstill[j];
-            if others || open || !(0..motion.len()).any(|k| rests(&k)) {
-                continue;
-            }
-            let needed: Vec<f64> = out[j].iter().zip(&dry[j]).map(|(rest, dry)| rest + dry).collect();
-            let likely = smoothed(&needed, HOLDS_OVER, motion.dt);
-            for k in (0..motion.len()).filter(rests) {
-                delivered[j] = self.actuation.at_joint(j, tau[j][k]);
-                let time = motion.start + k as f64 * motion.dt;
-                let limit = direction.bound(motion.v[j][k], time, &delivered).max(0.0);
-                let slips = likely[k].abs() > limit;
-                out[j][k] = if slips { needed[k] - limit.copysign(likely[k]) } else { 0.0 };
-                dry[j][k] = needed[k] - out[j][k];
-            }
-        }
     }
 
     /// Wind-up of every drive, from what links take that go with their motors.

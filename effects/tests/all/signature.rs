@@ -275,7 +275,7 @@ fn a_robot_offers_every_kind_where_it_can_be() {
         );
         let kinds: BTreeSet<Kind> = all.iter().map(|c| c.kind).collect();
         let not_alone = |kind: &Kind| kind.card().turned_by_tangent().is_none() && !kind.card().is_late();
-        let anywhere = |kind: &Kind| kind.card().turning.is_none() && !kind.card().of_its_log;
+        let anywhere = |kind: &Kind| kind.card().turning.is_none() && !kind.card().of_its_log();
         assert_eq!(kinds, Kind::ALL.into_iter().filter(not_alone).filter(anywhere).collect(), "{name}");
         for (i, a) in all.iter().enumerate() {
             assert!(!all[..i].contains(a), "{name}: {a:?} twice");

@@ -7,6 +7,9 @@ mod score;
 mod table;
 mod trial;
 
+pub use score::scored;
+pub use trial::gathered;
+
 use crate::cli::Withheld;
 use anyhow::Result;
 

@@ -1,11 +1,13 @@
 //! `gapscope withheld score`: a binary diagnoses the cases of banks; then the truth is opened.
 
+use super::bank::Case;
 use super::table;
 use super::trial::{gathered, kept, trials};
-use crate::cli::ScoreBank;
+use crate::cli::{ScoreBank, Trials};
 use crate::{output, report};
 use anyhow::{Result, bail};
 use gapscope_withheld::{CaseScore, Score, judge, judge_arm, judge_fault, judge_servo};
+use std::path::Path;
 
 /// Names of the files that a score writes.
 const RESULTS: [&str; 6] = ["score.json", "score.html", "score.md", "confusion.svg", "calibration.svg", "size.svg"];
@@ -31,19 +33,7 @@ pub fn run(args: &ScoreBank) -> Result<String> {
             );
         }
     }
-    let trials = trials(&cases, &args.how, args.keep.as_deref())?;
-    // Only now, with every answer given, is the truth opened.
-    let judged = cases.iter().zip(trials).map(|(case, trial)| {
-        let truth = case.truth()?;
-        let judgement = judge(&truth, trial.answer.as_ref(), trial.evaluation.as_ref());
-        let fault = judge_fault(&truth, trial.answer.as_ref());
-        let arm = judge_arm(&truth, trial.answer.as_ref(), &judgement, trial.impossible);
-        Ok(CaseScore::new([&case.bank, &case.name], &truth, judgement, trial.seconds, trial.error)
-            .on_arm(arm)
-            .on_servos(judge_servo(&truth, trial.answer.as_ref()))
-            .with_fault(fault))
-    });
-    let score = Score::new(judged.collect::<Result<_>>()?);
+    let score = scored(&cases, &args.how, args.keep.as_deref())?;
     let json = serde_json::to_string_pretty(&score)?;
     let mut text = table::score(&score);
     if let Some(out) = &args.out {
@@ -60,4 +50,24 @@ pub fn run(args: &ScoreBank) -> Result<String> {
         text.push_str(&format!("\nPictures and figures: {files}\n"));
     }
     Ok(if args.json { json } else { text })
+}
+
+/// The score of what a binary makes of cases; each diagnosis is kept in a folder where one is given.
+///
+/// # Errors
+/// A binary that does not start, or a truth that cannot be read.
+pub fn scored(cases: &[Case], how: &Trials, keep: Option<&Path>) -> Result<Score> {
+    let trials = trials(cases, how, keep)?;
+    // Only now, with every answer given, is the truth opened.
+    let judged = cases.iter().zip(trials).map(|(case, trial)| {
+        let truth = case.truth()?;
+        let judgement = judge(&truth, trial.answer.as_ref(), trial.evaluation.as_ref());
+        let fault = judge_fault(&truth, trial.answer.as_ref());
+        let arm = judge_arm(&truth, trial.answer.as_ref(), &judgement, trial.impossible);
+        Ok(CaseScore::new([&case.bank, &case.name], &truth, judgement, trial.seconds, trial.error)
+            .on_arm(arm)
+            .on_servos(judge_servo(&truth, trial.answer.as_ref()))
+            .with_fault(fault))
+    });
+    Ok(Score::new(judged.collect::<Result<_>>()?))
 }

@@ -53,7 +53,7 @@ pub fn trials(cases: &[Case], how: &Trials, keep: Option<&Path>) -> Result<Vec<T
     let bar = progress(cases.len());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(how.jobs.unwrap_or(0)).build()?;
     let trial = |case: &Case| {
-        let trial = Trial::run(case, &exe, limit, keep);
+        let trial = Trial::run(case, &exe, limit, keep, how.turn.as_deref());
         bar.inc(1);
         trial
     };
@@ -85,7 +85,7 @@ pub struct Trial {
 impl Trial {
     /// Diagnoses a case from its open folder, then evaluates the corrected model on the sealed test episodes.
     /// The diagnosis goes into a folder of `keep` too, where one is given.
-    fn run(case: &Case, exe: &Path, limit: Duration, keep: Option<&Path>) -> Result<Trial> {
+    fn run(case: &Case, exe: &Path, limit: Duration, keep: Option<&Path>, turn: Option<&str>) -> Result<Trial> {
         let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
         let (out, robot) = (scratch.path().join("out"), case.open.join("robot.urdf"));
         if let Some(keep) = keep {
@@ -96,6 +96,7 @@ impl Trial {
         let mut diagnose = Command::new(exe);
         diagnose.arg("diagnose").arg(&robot).args(case.logs()?).arg("--out").arg(&out);
         diagnose.args(drive.iter().flat_map(|file| ["--drive".as_ref(), file.as_os_str()]));
+        diagnose.args(turn.iter().flat_map(|turn| ["--turn", turn]));
         let began = Instant::now();
         let status = finish(&mut diagnose, scratch.path(), limit)?;
         let mut trial = Trial { seconds: began.elapsed().as_secs_f64(), ..Trial::default() };

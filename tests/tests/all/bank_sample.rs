@@ -30,7 +30,7 @@ fn truth(sealed: &Path) -> Option<Truth> {
     }
     let [effect] = effects.as_slice() else { return None };
     let kind = effect["kind"].as_str().unwrap();
-    let is_linear = |kind: Kind| kind.card().weighs && !kind.card().is_late() && !kind.card().of_its_log;
+    let is_linear = |kind: Kind| kind.card().weighs && !kind.card().is_late() && !kind.card().of_its_log();
     if !Kind::named(kind).is_some_and(is_linear) {
         return None;
     }

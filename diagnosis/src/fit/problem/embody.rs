@@ -2,9 +2,12 @@
 //! ([`gapscope_effects::Body`]), and Newton's method with a line search finds the least of the sum.
 
 use super::Problem;
-use crate::numbers::decide::BODIES_PULL;
 use gapscope_effects::Body;
 use nalgebra::{DMatrix, DVector};
+
+/// What the divergence of a link from the URDF counts, nats: so little that it moves what logs determine by nothing, enough
+/// that what they do not determine stays a body.
+const BODIES_PULL: f64 = 0.01;
 
 /// Steps, at most, halvings of a step, at most, and the rise of the sum, nats, from which on it has settled.
 const STEPS: usize = 40;

@@ -2,7 +2,7 @@
 
 use super::Problem;
 use crate::fit::estimate::Fit;
-use crate::numbers::decide::{FREEDOM, LAW_EXACT_TO, OUTLIER};
+use crate::numbers::decide::{EXACT_TO, FREEDOM, OUTLIER};
 use crate::record::band::Band;
 use crate::record::frequency::Equalizer;
 use statrs::function::erf::erfc;
@@ -29,9 +29,9 @@ impl Evidence {
     pub fn at_rest(&mut self, borne: &[Vec<Option<f64>>], variance: &[f64], correlation: &[f64], band: &Band) {
         for (j, borne) in borne.iter().enumerate() {
             for (row, borne) in band.rows.iter().zip(borne).filter(|(row, _)| row.fits) {
-                let beyond = borne.map_or(0.0, |x| (x.abs() - OUTLIER * variance[j].sqrt()).max(0.0));
-                let square = beyond * beyond / (FREEDOM * variance[j]);
-                let nats = 0.5 * (FREEDOM + 1.0) * square.ln_1p() / correlation[j];
+                let beyond = borne.map_or(0.0, |x| (x.abs() - OUTLIER.get() * variance[j].sqrt()).max(0.0));
+                let square = beyond * beyond / (FREEDOM.get() * variance[j]);
+                let nats = 0.5 * (FREEDOM.get() + 1.0) * square.ln_1p() / correlation[j];
                 self.seen[row.block] -= nats;
                 self.held_out[row.block] -= nats;
             }
@@ -66,7 +66,7 @@ fn odds_of_majority(errors: f64) -> f64 {
 /// and the log of their density.
 fn heavy_tailed(rest: &[f64], own: &[f64], least: f64) -> (f64, Vec<f64>) {
     let mut variance = (rest.iter().map(|r| r * r).sum::<f64>() / rest.len() as f64).max(least);
-    let weight = |r: f64, all: f64| (FREEDOM + 1.0) / (FREEDOM + r * r / all);
+    let weight = |r: f64, all: f64| (FREEDOM.get() + 1.0) / (FREEDOM.get() + r * r / all);
     for _ in 0..TAIL_STEPS {
         let (mut sum, mut count) = (0.0, 0.0);
         for (r, own) in rest.iter().zip(own) {
@@ -78,7 +78,7 @@ fn heavy_tailed(rest: &[f64], own: &[f64], least: f64) -> (f64, Vec<f64>) {
     }
     let density = |(r, own): (&f64, &f64)| {
         let all = variance + own;
-        -0.5 * all.ln() - 0.5 * (FREEDOM + 1.0) * (r * r / (FREEDOM * all)).ln_1p()
+        -0.5 * all.ln() - 0.5 * (FREEDOM.get() + 1.0) * (r * r / (FREEDOM.get() * all)).ln_1p()
     };
     (variance, rest.iter().zip(own).map(density).collect())
 }
@@ -129,7 +129,7 @@ impl Problem {
         let noise = vec![1.0; self.joints.len()];
         let mut evidence = Evidence { seen: blocks.clone(), held_out: blocks, occam: 0.0, far: 0.0, noise };
         for (j, joint) in self.joints.iter().enumerate().filter(|(_, joint)| !joint.rows.is_empty()) {
-            let inexact: Vec<f64> = joint.linear_target.iter().map(|x| (LAW_EXACT_TO * x).powi(2)).collect();
+            let inexact: Vec<f64> = joint.linear_target.iter().map(|x| (EXACT_TO.get() * x).powi(2)).collect();
             let least = self.least_noise(j);
             let open = |i: usize| unpredicted.is_some_and(|rows| rows[j][joint.rows[i]]);
             let told: Vec<usize> = (0..joint.rows.len()).filter(|&i| !open(i)).collect();
@@ -233,8 +233,8 @@ mod tests {
             evidence.at_rest(&[vec![Some(borne); band.rows.len()]], &[1.0], &[1.0], &band);
             evidence.seen.iter().sum::<f64>()
         };
-        assert_eq!(at(0.9 * OUTLIER), 0.0);
-        assert!(at(2.0 * OUTLIER) < 0.0 && at(4.0 * OUTLIER) < at(2.0 * OUTLIER));
+        assert_eq!(at(0.9 * OUTLIER.get()), 0.0);
+        assert!(at(2.0 * OUTLIER.get()) < 0.0 && at(4.0 * OUTLIER.get()) < at(2.0 * OUTLIER.get()));
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //! ln p = −½ Σ ν_j ln v_j − ½ (Σ s_j / (ρ_j v_j) − bᵀA⁻¹b) − ½ ln|A| − ½ ln|P|,    ν_j = n_j / ρ_j.
 
 use super::Problem;
-use crate::numbers::decide::LEAST_GAP;
+use crate::numbers::decide::IMMATERIAL;
 use crate::numbers::factor::Factor;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -105,7 +105,7 @@ impl Problem {
             let square: f64 = joint.values.iter().skip(at).step_by(m).map(|x| x * x).sum();
             let count = joint.rows.len().max(1) as f64;
             let unit = self.scale[j].powi(2);
-            gap += (self.gap[j].powi(2) + (LEAST_GAP * self.scale[j]).powi(2)) / unit;
+            gap += (self.gap[j].powi(2) + (IMMATERIAL.get() * self.scale[j]).powi(2)) / unit;
             size += square / count / unit;
         }
         if size > 0.0 { (gap / size).sqrt() } else { 1.0 }

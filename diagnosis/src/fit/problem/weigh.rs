@@ -2,7 +2,7 @@
 
 use super::Problem;
 use super::solve::{JointNormal, Normal};
-use crate::numbers::decide::{FAR_OUT, LAW_EXACT_TO, OUTLIER, UNNOTICED};
+use crate::numbers::decide::{EXACT_TO, FAR_OUT, OUTLIER, UNNOTICED};
 use crate::numbers::factor::Factor;
 use crate::record::band::Band;
 use nalgebra::{DMatrix, DVector};
@@ -29,12 +29,12 @@ impl Problem {
                 let mut size: Vec<f64> = rest.iter().map(|r| r.abs()).collect();
                 let middle = size.len() / 2;
                 let spread = 1.4826 * *size.select_nth_unstable_by(middle, f64::total_cmp).1;
-                let least = UNNOTICED * self.scale[j];
+                let least = UNNOTICED.get() * self.scale[j];
                 for (weight, r) in rows.robust.iter_mut().zip(&rest) {
-                    let z = r.abs() / (OUTLIER * spread.max(least));
+                    let z = r.abs() / (OUTLIER.get() * spread.max(least));
                     // Huber near, and far out as if the row were not there.
-                    *weight = if z > FAR_OUT {
-                        FAR_OUT / (z * z)
+                    *weight = if z > FAR_OUT.get() {
+                        FAR_OUT.get() / (z * z)
                     } else if z > 1.0 {
                         1.0 / z
                     } else {
@@ -90,7 +90,7 @@ impl Problem {
     fn allow_for_inexact_laws(&mut self) {
         for (rows, sigma) in self.joints.iter_mut().zip(&self.sigma) {
             for (weight, target) in rows.robust.iter_mut().zip(&rows.linear_target) {
-                *weight /= 1.0 + (LAW_EXACT_TO * target / sigma).powi(2);
+                *weight /= 1.0 + (EXACT_TO.get() * target / sigma).powi(2);
             }
         }
     }
@@ -177,7 +177,7 @@ impl Problem {
 
     /// Least variance of the rows of a joint: what sampling and integration leave, (N m)² or N².
     pub(super) fn least_noise(&self, joint: usize) -> f64 {
-        (UNNOTICED * self.scale[joint]).powi(2)
+        (UNNOTICED.get() * self.scale[joint]).powi(2)
     }
 }
 

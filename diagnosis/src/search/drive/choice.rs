@@ -3,7 +3,7 @@
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
 use crate::fit::terms::Term;
-use crate::numbers::decide::WORTH_A_LOOK;
+use crate::numbers::decide::FLOOR_KNOWN_TO;
 use crate::record::floor::noise_floor;
 use crate::record::logs::{Progress, Record};
 use crate::search::chosen::{Chosen, Turned};
@@ -132,7 +132,7 @@ impl Record<'_> {
         let calm = |j: usize| floor[j].min(chosen.exact.sigma[j]).max(f64::MIN_POSITIVE);
         let level = |j: usize| left[j].sqrt() / calm(j);
         let mut joints: Vec<usize> =
-            (0..self.model.dof()).filter(|&j| self.moving[j] && level(j) > WORTH_A_LOOK).collect();
+            (0..self.model.dof()).filter(|&j| self.moving[j] && level(j) > FLOOR_KNOWN_TO.get()).collect();
         joints.sort_by(|&a, &b| level(b).total_cmp(&level(a)));
         Ok(joints)
     }

@@ -7,7 +7,7 @@
 use super::{Rigid, Runs, Study, beyond_doubt, dot, mean, tells, turning};
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
-use crate::numbers::decide::WORTH_A_LOOK;
+use crate::numbers::decide::FLOOR_KNOWN_TO;
 use crate::record::logs::Record;
 use gapscope_effects::{Candidate, EffectError, EncoderSide, Kind, Turning};
 use rayon::prelude::*;
@@ -90,7 +90,7 @@ impl Study<'_> {
             return false;
         }
         let floor = floor * (mean(&without.noise) / mean(&self.rigid.noise).max(f64::MIN_POSITIVE)).sqrt();
-        mean(&hidden).sqrt().hypot(floor) > WORTH_A_LOOK * floor
+        mean(&hidden).sqrt().hypot(floor) > FLOOR_KNOWN_TO.get() * floor
     }
 
     /// Mean square of each block that a rigid drive with the best rotor would leave of a drive, beyond noise, (N m)².

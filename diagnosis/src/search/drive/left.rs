@@ -1,7 +1,7 @@
 //! What an account of a joint's drive leaves, and of that what noise leaves.
 
 use super::*;
-use crate::numbers::decide::{BLOCK_OF_NOISE, BLOCKS_THAT_TELL, LIGHTEST_ROTOR, NOT_RIGID, NOT_RIGID_LEAVES};
+use crate::numbers::decide::{BLOCK_OF_NOISE, LIGHTEST_ROTOR, NOT_RIGID_LEAVES};
 
 impl Study<'_> {
     /// What a drive leaves at the rows of the band; nothing of the episodes that are not looked at.
@@ -56,7 +56,7 @@ impl Study<'_> {
         let rigid = [(Candidate::rotor(self.joint), self.rotor)];
         let (rest, noise) = self.rows_and_noise(&rigid, view).next().unwrap_or_default();
         let seen: Vec<f64> = noise.iter().copied().filter(|noise| *noise > 0.0).collect();
-        let nothing = BLOCK_OF_NOISE * mean(&seen) + self.unnoticed;
+        let nothing = BLOCK_OF_NOISE.get() * mean(&seen) + self.unnoticed;
         let mut rigid = Rigid { noise, nothing, left: Vec::new() };
         rigid.left = self.beyond(rest, &taken_off(&rigid.noise, &rigid, view), nothing);
         rigid
@@ -91,7 +91,7 @@ impl Study<'_> {
             let tries: Vec<(Candidate, f64)> = tries
                 .into_iter()
                 .map(|(knob, by)| (Candidate { shape: knob * best.1.shape, ..best.1.clone() }, by * best.2))
-                .filter(|(_, rotor)| *rotor >= LIGHTEST_ROTOR * self.inertia)
+                .filter(|(_, rotor)| *rotor >= LIGHTEST_ROTOR.get() * self.inertia)
                 .collect();
             let next = levels(&tries).into_iter().zip(tries).map(|(level, (drive, rotor))| (level, drive, rotor));
             let next = next.into_iter().find(|next| next.0 < best.0);
@@ -195,9 +195,10 @@ impl Study<'_> {
     }
 }
 
-/// Whether enough blocks of time show something, by what is left of each.
+/// Whether enough blocks of time show something, by what is left of each: a spread takes two. A joint that its load holds on one
+/// side may cross its play once or twice.
 pub(super) fn tells(rigid: &Rigid, left: &[f64]) -> bool {
-    left.iter().filter(|left| **left > 2.0 * rigid.nothing).count() >= BLOCKS_THAT_TELL
+    left.iter().filter(|left| **left > 2.0 * rigid.nothing).count() >= 2
 }
 
 /// By how many standard errors less is left of the blocks with an account than by a rigid drive, where that is beyond
@@ -208,7 +209,7 @@ pub(super) fn beyond_doubt(rigid: &Rigid, with: &[f64]) -> Option<f64> {
     let telling: Vec<f64> =
         ratios().filter(|(r, d)| r.max(**d) > 2.0 * rigid.nothing).map(|(r, d)| (r / d).ln()).collect();
     let beyond = telling.iter().sum::<f64>() / mean_square(&telling).sqrt() / (telling.len().max(1) as f64).sqrt();
-    (beyond > NOT_RIGID && (gain > -NOT_RIGID_LEAVES.ln() || mean(with) < NOT_RIGID_LEAVES * mean(&rigid.left)))
+    (beyond > 0.0 && (gain > -NOT_RIGID_LEAVES.get().ln() || mean(with) < NOT_RIGID_LEAVES.get() * mean(&rigid.left)))
         .then_some(beyond)
 }
 

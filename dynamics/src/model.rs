@@ -126,6 +126,9 @@ pub enum ModelError {
     },
 }
 
+/// Radius of the ball that a link without inertia becomes once it has a mass, m.
+const BALL: f64 = 0.05;
+
 /// Where the inertial parameters of a link come from: how far they may be from the true ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum InertialSource {
@@ -136,6 +139,8 @@ pub enum InertialSource {
     Cad,
     /// Guessed, or left at what a tool wrote.
     Guessed,
+    /// The mass is from a scale, where it lies is guessed: a tool on the last link.
+    MassKnown,
 }
 
 /// A robot arm on a fixed base: a tree of joints with their links, gravity, and rotor inertias. Immutable once built.
@@ -262,6 +267,23 @@ impl Model {
     pub fn with_inertial_source(mut self, joint: usize, source: InertialSource) -> Self {
         self.sources[joint] = source;
         self
+    }
+
+    /// The same model with another mass of the link that `joint` moves, kg, of the same shape about the same centre; a link
+    /// without inertia becomes a ball about its origin.
+    ///
+    /// # Panics
+    /// If `joint` is not less than [`Model::dof`].
+    #[must_use]
+    pub fn with_mass(self, joint: usize, mass: f64) -> Self {
+        let body = self.joints[joint].inertia;
+        let inertia = if body.mass > 0.0 {
+            let times = mass / body.mass;
+            Inertia { mass, first_moment: times * body.first_moment, rotational: body.rotational * times }
+        } else {
+            Inertia::from_com(mass, DVec3::ZERO, DMat3::IDENTITY * (0.4 * mass * BALL * BALL))
+        };
+        self.with_inertia(joint, inertia)
     }
 
     /// The model as the kernels see it.

@@ -35,7 +35,7 @@ pub struct Diagnose {
     /// What is known of the servos, where logs hold no torque: gains, constants, limits, as numbers or ranges (TOML)
     #[arg(long, value_name = "FILE")]
     pub drive: Option<PathBuf>,
-    /// How well the links' inertials are known: weighed, cad (the default) or guessed; or one link's, e.g. `link6=weighed`
+    /// How well the links' inertials are known: weighed, cad (the default) or guessed; or one link's, e.g. `link6=weighed`, or the mass of one with its tool, `link6=1.2kg`
     #[arg(long, value_name = "[LINK=]SOURCE")]
     pub trust: Vec<String>,
     /// Turn a number that decides by a factor, e.g. `TWENTY_TO_ONE=2`: for `study numbers`

@@ -113,6 +113,8 @@ const INERTIA: f64 = 0.3;
 const WEIGHED: f64 = 0.2;
 /// ... and those whose inertials were guessed: by six tenths of the mass, and 6 cm.
 const GUESSED: f64 = 4.0;
+/// How many times as far off the mass of a link may be that was put on a scale: by seven thousandths, as its bolts and cables.
+const ON_A_SCALE: f64 = 0.05;
 /// Least mass that a link is taken to have, as a part of the robot's: some URDFs have links without inertia.
 const LEAST: f64 = 0.01;
 
@@ -126,12 +128,13 @@ fn scales(model: &Model, joint: usize) -> Vec<f64> {
     let moment = mass * CENTER.hypot(MASS * lever);
     let rotational = (body.rotational.x_axis.x + body.rotational.y_axis.y + body.rotational.z_axis.z).max(0.0);
     let inertia = INERTIA * rotational + mass * CENTER * (CENTER + 2.0 * lever);
-    let times = match model.inertial_source(joint) {
-        InertialSource::Weighed => WEIGHED,
-        InertialSource::Cad => 1.0,
-        InertialSource::Guessed => GUESSED,
+    let (of_mass, of_shape) = match model.inertial_source(joint) {
+        InertialSource::Weighed => (WEIGHED, WEIGHED),
+        InertialSource::Cad => (1.0, 1.0),
+        InertialSource::Guessed => (GUESSED, GUESSED),
+        InertialSource::MassKnown => (ON_A_SCALE, GUESSED),
     };
-    [&[MASS * mass][..], &[moment; 3], &[inertia; 6]].concat().into_iter().map(|scale| times * scale).collect()
+    [&[of_mass * MASS * mass][..], &[of_shape * moment; 3], &[of_shape * inertia; 6]].concat()
 }
 
 /// The error with these ten coefficients of the link's regressor.
@@ -163,6 +166,9 @@ mod tests {
         for ((known, own), guessed) in scales(&known, 2).iter().zip(scales(&model, 2)).zip(scales(&guessed, 2)) {
             assert_eq!((*known, guessed), (WEIGHED * own, GUESSED * own));
         }
+        let tool = model.clone().with_inertial_source(2, InertialSource::MassKnown);
+        let (tool, own) = (scales(&tool, 2), scales(&model, 2));
+        assert_eq!((tool[0], tool[1], tool[9]), (ON_A_SCALE * own[0], GUESSED * own[1], GUESSED * own[9]));
         let bare = model.clone().with_inertia(2, Inertia::from_parameters(&[0.0; 10]));
         assert!(scales(&bare, 2).iter().all(|s| *s > 0.0));
     }

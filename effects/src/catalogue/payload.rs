@@ -7,7 +7,7 @@
 use crate::card::{Apart, Card, Place, Size};
 use crate::law::{Law, Listed, Signature, Value, check};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
-use gapscope_dynamics::{Data, Inertia, Model};
+use gapscope_dynamics::{Data, Inertia, InertialSource, Model};
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, Matrix3};
 use serde::{Deserialize, Serialize};
@@ -87,8 +87,8 @@ impl Signature for Payload {
         candidate.joint().map_or_else(Vec::new, |j| signature(motion, j))
     }
 
-    fn scales(_candidate: &Candidate, model: &Model) -> Option<Vec<f64>> {
-        Some(scales(model))
+    fn scales(candidate: &Candidate, model: &Model) -> Option<Vec<f64>> {
+        candidate.joint().map(|j| scales(model, j))
     }
 }
 
@@ -135,9 +135,17 @@ const MASS: f64 = 0.2;
 /// ... and where it is held, m from the last link's origin.
 const LEVER: f64 = 0.15;
 
+/// What a link that was weighed with its tool may carry beside, as a part of its mass.
+const ON_A_SCALE: f64 = 0.007;
+
 /// Plausible sizes of the ten coefficients, standard deviations about no payload: kg, kg m, kg m².
-fn scales(model: &Model) -> Vec<f64> {
-    let mass = MASS * model.joints().iter().map(|j| j.inertia.mass).sum::<f64>();
+fn scales(model: &Model, joint: usize) -> Vec<f64> {
+    let all: f64 = model.joints().iter().map(|j| j.inertia.mass).sum();
+    // What was on the scale carries nothing more.
+    let mass = match model.inertial_source(joint) {
+        InertialSource::MassKnown => ON_A_SCALE * model.joints()[joint].inertia.mass,
+        _ => MASS * all,
+    };
     [&[mass][..], &[mass * LEVER; 3], &[mass * LEVER * LEVER; 6]].concat()
 }
 

@@ -203,7 +203,7 @@ mod tests {
     }
 
     fn calibrated(bank: &Path, answers: PathBuf, json: bool) -> Result<String> {
-        let how = Trials { exe: None, jobs: None, timeout: 1.0 };
+        let how = Trials { exe: None, jobs: None, timeout: 1.0, turn: None };
         run(&CalibrateBank { banks: vec![bank.to_owned()], answers: Some(answers), how, json })
     }
 

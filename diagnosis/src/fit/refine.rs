@@ -142,9 +142,12 @@ impl Data<'_> {
                     let less = |(tau, rest): (&Vec<f64>, &Vec<f64>)| tau.iter().zip(rest).map(|(t, r)| t - r).collect();
                     Ok(tau.iter().zip(&rest).map(less).collect())
                 };
+                let driven = if crossed { &s.tau } else { &idle };
+                let load = torque(&effects, driven)?;
+                let taken = if taken.len() == effects.len() { load.clone() } else { torque(&taken, driven)? };
                 Ok(Signals {
-                    load: Some(torque(&effects, if crossed { &s.tau } else { &idle })?),
-                    taken: Some(torque(&taken, if crossed { &s.tau } else { &idle })?),
+                    load: Some(load),
+                    taken: Some(taken),
                     bodies: Some(bodies.clone()),
                     drives: plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?.drives(),
                     ..s.clone()

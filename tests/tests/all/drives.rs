@@ -80,7 +80,6 @@ fn spring(model: &Model, joint: &str, resonance: f64) -> JointElasticity {
 /// Above the resonance of rotor and link, a spring's account of the torque multiplies the noise of the encoder: seen as they
 /// are, this spring leaves as much as a rigid drive.
 #[test]
-#[ignore = "missed since the competition on one score: issue 23"]
 fn a_spring_that_noise_drowns() {
     let model = robot("arm6");
     let spring = spring(&model, "joint2", 4.0);

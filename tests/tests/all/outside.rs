@@ -93,7 +93,6 @@ fn friction_is_found_beside_a_spot_that_rubs() {
 }
 
 #[test]
-#[ignore = "few blocks of time hold the spot, and the others vote against it: issue 23"]
 fn a_spot_that_rubs_beside_friction_of_its_size_is_said_to_be_like_one() {
     let model = robot(ROBOT);
     let viscous = model.joints().iter().map(|j| (j.name.clone(), 0.05)).collect();

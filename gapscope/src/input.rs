@@ -125,9 +125,9 @@ pub fn fault_line(fault: &Fault) -> String {
     let joints =
         if fault.joints.is_empty() || named { String::new() } else { format!("{}: ", fault.joints.join(", ")) };
     let done = match (fault.mended, fault.leaves_joints_out()) {
-        (true, _) => "mended here; to mend the log",
-        (false, true) => "left out here; the mend",
-        (false, false) => "taken as logged; the mend",
+        (true, _) => "Mended here; to mend the log",
+        (false, true) => "Left out here; the mend",
+        (false, false) => "Taken as logged; the mend",
     };
     format!("{files}{joints}{}. {done}: {}", fault.evidence, fault.mend)
 }

@@ -8,9 +8,9 @@ use crate::input::fault_line;
 use crate::report::plain;
 use crate::report::terminal::{INDENT, Paint, block, blocks, clean, column, fill, name as padded, pad, wrap};
 use crate::report::{
-    capital, changed, count, effect, effects, figure, headline, implied_unit, in_words, interval, is_above_floor,
+    beside_the_answer, capital, changed, count, effect, effects, figure, headline, implied_unit, in_words, interval, is_above_floor,
     largest, list, motion_unit, outstanding, percent, percent_figure, plain as rounded, power_line, regime,
-    significant, verdict, with_unit, words_of_the_rest,
+    sentences, significant, verdict, with_unit, words_of_the_rest,
 };
 use change::Cells;
 use gapscope_datasets::{Doubt, Fault};
@@ -94,7 +94,7 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
         block(&mut lines, paint, "Power", &[line]);
     }
     if let Some(next) = &diagnosis.next_experiment {
-        block(&mut lines, paint, "Next", &[clean(&in_words(&next.motion))]);
+        block(&mut lines, paint, "Next", &[clean(&sentences(&in_words(&next.motion)))]);
     }
     let mut text = ordinary_spaces(&lines);
     if let Some(out) = out {
@@ -278,10 +278,7 @@ fn notes(diagnosis: &Diagnosis, terminal: bool) -> Vec<String> {
     if let Some(other) = best.filter(|a| a.probability >= 0.05) {
         let kinds: Vec<String> = other.effects.iter().map(|kind| effect(kind)).collect();
         let kinds = if kinds.is_empty() { "no effect at all".into() } else { kinds.join(" + ") };
-        rows.push(clean(&format!(
-            "instead of all these, with a probability of {}: {kinds}",
-            percent(other.probability)
-        )));
+        rows.push(clean(&format!("instead of all these, {}: {kinds}", beside_the_answer(other.probability))));
     }
     if matches!(diagnosis.verdict, Verdict::PartlyExplained | Verdict::UnknownEffect) {
         rows.push(clean(&words_of_the_rest(&diagnosis.unexplained, &diagnosis.joints)));

@@ -3,7 +3,7 @@
 mod answer;
 pub mod schema;
 
-use super::format::{self, percent, percent_interval, with_unit};
+use super::format::{self, percent, percent_interval, percent_within, with_unit};
 use super::gauge::{Figure, Gauge, JointGap};
 use super::scene::Scene;
 use super::{Top, curves, effects, heatmap, joints, reproduce, rest, section, series, setting, why, words};
@@ -17,7 +17,7 @@ use gapscope_servo::{Evidence, Outcome, Signal};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
-pub use answer::{answer, nominal};
+pub use answer::{angle, answer, nominal};
 
 /// Part of a joint's samples whose speed a curve shows: the fastest are noise of the encoder.
 const USUAL: f64 = 0.99;
@@ -145,16 +145,22 @@ pub fn html(outcome: &Outcome, beside: &Beside, corrected: &str) -> String {
 }
 
 fn gauge(diagnosis: &Diagnosis, evidence: &Evidence, beside: &Beside) -> Gauge {
-    let thousandths = |map: &BTreeMap<String, f64>, joint: &str| map.get(joint).map(|rms| 1e3 * rms);
-    let figure =
-        |map: &BTreeMap<String, f64>, joint: &str| thousandths(map, joint).map(|value| Figure { value, ci95: None });
     let gap = &diagnosis.gap.position;
+    // Thousandths, unless a joint is off by a whole unit.
+    let scale = if gap.rms.values().all(|rms| *rms < 1.0) { 1e3 } else { 1.0 };
+    let scaled = |map: &BTreeMap<String, f64>, joint: &str| map.get(joint).map(|rms| scale * rms);
+    let figure =
+        |map: &BTreeMap<String, f64>, joint: &str| scaled(map, joint).map(|value| Figure { value, ci95: None });
+    let unit = |joint: &str| {
+        let small = beside.units.get(joint).copied().unwrap_or("mrad");
+        if scale > 1.0 { small } else { &small[1..] }.to_owned()
+    };
     let joint = |name: &String| JointGap {
         name: name.clone(),
-        unit: beside.units.get(name).copied().unwrap_or("mrad").to_owned(),
+        unit: unit(name),
         before: figure(&gap.rms, name),
         after: figure(&evidence.remaining, name),
-        floor: thousandths(&gap.floor, name),
+        floor: scaled(&gap.floor, name),
     };
     Gauge {
         what: "position",
@@ -230,9 +236,9 @@ fn weighted(diagnosis: &Diagnosis) -> String {
     let moves = if shrink < 0.0 { "grows" } else { "shrinks" };
     format!(
         "{lead} Over all joints, each by how far it is told to move, it {moves} from {} to {}, by {}{interval}.",
-        format::figure(1e3 * before),
-        with_unit(&format::figure(1e3 * after), "mrad"),
-        percent(shrink.abs())
+        angle(before, after),
+        angle(after, before),
+        percent_within(shrink.abs(), change.ci95)
     )
 }
 

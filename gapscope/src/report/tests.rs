@@ -1,7 +1,6 @@
 //! The page as a whole: well formed, escaped, finite, small, and the same every time.
 
 #[path = "../../tests/all/browser.rs"]
-#[allow(clippy::print_stdout)]
 pub mod browser;
 
 use super::*;

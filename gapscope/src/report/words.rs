@@ -31,6 +31,24 @@ pub fn in_words(text: &str) -> String {
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
+/// A text of sentences, each with a capital letter and a stop.
+pub fn sentences(text: &str) -> String {
+    let list: Vec<String> = text.trim_end_matches('.').split(". ").map(capital).collect();
+    list.join(". ") + "."
+}
+
+/// From this probability on another account is at least as likely as the answer.
+const EVEN: f64 = 0.5;
+
+/// How another account does beside the answer, of which the probability knows these two alone.
+pub fn beside_the_answer(probability: f64) -> String {
+    if probability >= EVEN {
+        "at least as well as the answer".into()
+    } else {
+        format!("less well: {} against the answer", percent(probability))
+    }
+}
+
 /// What the real robot does that the model does not, in one clause; empty for kinds outside the catalogue.
 pub fn meaning(kind: &str) -> &'static str {
     Kind::named(kind).map_or("", |kind| kind.card().meaning)

@@ -1,8 +1,8 @@
 //! The answer in three sentences: where, which, how far.
 
 use super::format::{
-    count, estimate, numbers, percent, percent_interval, percent_within, plain, probability_figure, significant, span, with_interval,
-    with_unit,
+    count, estimate, numbers, percent, percent_interval, percent_within, plain, probability_figure, significant, span,
+    with_interval, with_unit,
 };
 use super::words;
 use gapscope_diagnosis::schema::{Change, Diagnosis, Estimate, Evidence, FoundEffect, Parameter, Regime, Verdict};
@@ -100,7 +100,8 @@ fn how_far(diagnosis: &Diagnosis) -> String {
         }
         _ => {}
     }
-    let added = if diagnosis.effects.len() == 1 { "With the effect in the model" } else { "With the effects in the model" };
+    let added =
+        if diagnosis.effects.len() == 1 { "With the effect in the model" } else { "With the effects in the model" };
     let rollout = diagnosis.shrink.rollout.last().and_then(|h| {
         Some(format!(
             ", and the position error of {} s rollouts {}",

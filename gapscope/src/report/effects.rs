@@ -108,7 +108,7 @@ fn joint_table(parameters: &[(&String, &BTreeMap<String, Estimate>)], all: &[Str
             tbody {
                 @for joint in joints {
                     tr {
-                        th scope="row" { span.name { (joint) } }
+                        th scope="row" { span.name { (words::breaking(joint)) } }
                         @for (_, map) in parameters {
                             td.number {
                                 @match map.get(joint) {

@@ -21,13 +21,14 @@ struct Column<'a> {
 }
 
 /// The heat map, or a sentence where there is nothing to show; `whole` says what the shares are parts of, `quiet` which
-/// joints are at the noise floor and stay pale.
+/// joints are at the noise floor and stay pale. The `first` map of a page explains its signs.
 pub fn render(
     joints: &[String],
     regimes: &[Regime],
     caption: &str,
     whole: &str,
     quiet: &dyn Fn(&str) -> bool,
+    first: bool,
 ) -> Markup {
     let joints: Vec<&String> = joints.iter().filter(|joint| regimes.iter().any(|r| r.joint == **joint)).collect();
     let groups = groups(&joints, regimes);
@@ -56,7 +57,7 @@ pub fn render(
                 tbody {
                     @for (row, joint) in joints.iter().enumerate() {
                         tr.quiet[quiet(joint)] data-joints=(super::listed(std::slice::from_ref(*joint))) {
-                            th scope="row" { span { (joint) @if quiet(joint) { small { "at the noise" } } } }
+                            th scope="row" { span { (words::breaking(joint)) @if quiet(joint) { small { "at the noise" } } } }
                             @for group in &groups {
                                 @for (i, column) in group.columns.iter().enumerate() {
                                     (cell(column.cells.get(row).copied().flatten(), i == 0, quiet(joint)))
@@ -67,7 +68,7 @@ pub fn render(
                 }
             }
         }
-        (legend(whole))
+        @if first { (legend(whole)) } @else { p.legend { "Share of " (whole) ", %; shade and frame as in the table of the whole gap." } }
     }
 }
 

@@ -74,9 +74,8 @@ impl From<&gapscope_servo::schema::Diagnosis> for Found {
     fn from(found: &gapscope_servo::schema::Diagnosis) -> Found {
         let change = &found.shrink.position;
         let [before, after] = [change.before, change.after].map(|gap| gap.unwrap_or(f64::NAN));
-        let gap = |gap: f64, beside: f64| {
-            (gap, if gap.is_finite() { super::servo::angle(gap, beside) } else { NONE.into() })
-        };
+        let gap =
+            |gap: f64, beside: f64| (gap, if gap.is_finite() { super::servo::angle(gap, beside) } else { NONE.into() });
         let gaps = [gap(before, after), gap(after, before)];
         let verdict = super::servo::schema::verdict(&found.verdict);
         let list = found.effects.iter();
@@ -187,9 +186,8 @@ fn link(entry: &Entry) -> Markup {
     } else {
         format!("{}/report.html", address(&entry.folder))
     };
-    // Long names break between their parts.
-    let parts = || html! { @for part in name(entry).split_inclusive(['/', '_', '-']) { (part) wbr; } };
-    html! { @if entry.has_report { a href=(file) { (parts()) } } @else { (parts()) } }
+    let parts = words::breaking(name(entry));
+    html! { @if entry.has_report { a href=(file) { (parts) } } @else { (parts) } }
 }
 
 /// A path as an address: what a browser would read as something else is written by its code.
@@ -220,7 +218,10 @@ fn cells(found: &Found) -> Vec<Cell> {
         number(before, before_text),
         number(after, after_text),
         number(found.left, percent(found.left)),
-        number(found.faults.len() as f64, if found.faults.is_empty() { NONE.into() } else { found.faults.len().to_string() }),
+        number(
+            found.faults.len() as f64,
+            if found.faults.is_empty() { NONE.into() } else { found.faults.len().to_string() },
+        ),
     ]
 }
 

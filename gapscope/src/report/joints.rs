@@ -57,7 +57,7 @@ fn row(gap: &JointGap, gauge: &Gauge, after: bool) -> Markup {
     let top = top(unit, gauge);
     html! {
         div.row role="row" data-joints=(super::listed(std::slice::from_ref(joint))) {
-            span.name role="rowheader" { (joint) }
+            span.name role="rowheader" { (super::words::breaking(joint)) }
             span.bar role="cell" { (bars::render(&bars, floor, top, &description)) }
             span.number role="cell" data-label="before" { (cell(&first)) }
             @if after {

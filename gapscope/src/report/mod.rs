@@ -49,8 +49,8 @@ pub use answer::sentences as answer_sentences;
 pub use answer::{changed, headline, is_above_floor, largest};
 pub use axis::Axis;
 pub use format::{
-    NONE, Printed, count, estimate, figure, percent, percent_figure, percent_interval, percent_within, plain, probability_figure,
-    significant, span, with_unit,
+    NONE, Printed, count, estimate, figure, percent, percent_figure, percent_interval, percent_within, plain,
+    probability_figure, significant, span, with_unit,
 };
 pub use heatmap::picture as heatmap_picture;
 pub use index::{Entry, Found, page as index_page};
@@ -61,8 +61,8 @@ pub use series::picture as series_picture;
 pub use servo::{Beside, answer as servo_answer, html as servo_html};
 pub use setting::Setting;
 pub use words::{
-    beside_the_answer, capital, effect, effects, implied_unit, in_words, interval, joints as joint_list, list, motion_unit, outstanding,
-    parameter, regime, regime_phrase, rest as words_of_the_rest, said_of, sentences, verdict,
+    beside_the_answer, capital, effect, effects, implied_unit, in_words, interval, joints as joint_list, list,
+    motion_unit, outstanding, parameter, regime, regime_phrase, rest as words_of_the_rest, said_of, sentences, verdict,
 };
 
 /// Colours, type and layout; light and dark, wide, narrow and print.
@@ -271,7 +271,11 @@ fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Set
     };
     html! {
         @if evaluated { (section(OVER_TIME, "Torque over time", "", &series::render(gauge))) }
-        (section("effects", "Effects", "What the robot does that the model does not, strongest first. Of the effects reported with a confidence of 90 %, nine in ten are there.",
+        @let lead = match diagnosis.effects.len() {
+            0 => "",
+            _ => "What the robot does that the model does not, strongest first. Of the effects reported with a confidence of 90 %, nine in ten are there.",
+        };
+        (section("effects", "Effects", lead,
             &effects::render(&plain::together(diagnosis), &diagnosis.joints, "alone, torque gap shrinks by", words::nothing_found(diagnosis.verdict))))
         @if evaluated && !diagnosis.effects.is_empty() { (laws(diagnosis, evidence)) }
         @if let Some(paste) = paste::render(diagnosis, setting, &robot) {
@@ -281,7 +285,9 @@ fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Set
         @if let Some(bodies) = rest::bodies(diagnosis) {
             (section("bodies", "What the logs tell of bodies", "Sums over all that a joint carries, where those of single links are not told: differences from the robot description, surest first.", &bodies))
         }
-        (section("alternatives", "What else it could be", "Other sets of effects that these logs do not exclude.", &rest::alternatives(diagnosis)))
+        @if evaluated && diagnosis.verdict != Verdict::NoGap {
+            (section("alternatives", "What else it could be", "Other sets of effects that these logs do not exclude.", &rest::alternatives(diagnosis)))
+        }
         @if let Some(why) = why::render(&diagnosis.why, &diagnosis.joints) {
             (section("why", "Why it is so", "What was proposed, against what, and by how much the logs spoke for it.", &why))
         }
@@ -323,7 +329,7 @@ fn figures(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence) -> Markup 
         (section("regimes", "Where the gap lies", "In which regimes of the motion the model as described is off, on held-out data.",
             &html! {
                 p.point { (unbroken(&place)) }
-                (heatmap::render(&diagnosis.joints, &diagnosis.gap.regimes, "Gap by joint and regime", "the joint’s squared torque gap", &quiet))
+                (heatmap::render(&diagnosis.joints, &diagnosis.gap.regimes, "Gap by joint and regime", "the joint’s squared torque gap", &quiet, true))
             }))
         (section("shrink", "How far it shrinks", "", &html! {
             p.point { (unbroken(&how_far)) }

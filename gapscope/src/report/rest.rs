@@ -19,7 +19,7 @@ pub fn unexplained(diagnosis: &Diagnosis) -> Markup {
         } @else {
             p { (sentence(diagnosis)) }
             @if left.fraction > 0.0 && !left.regimes.is_empty() {
-                @let map = heatmap::render(&diagnosis.joints, &left.regimes, "What is left, by joint and regime", "the square of what is left at the joint", &|joint: &str| !super::is_above_floor(diagnosis, joint));
+                @let map = heatmap::render(&diagnosis.joints, &left.regimes, "What is left, by joint and regime", "the square of what is left at the joint", &|joint: &str| !super::is_above_floor(diagnosis, joint), false);
                 // Shares of next to nothing are no place to look at.
                 @if left.fraction < TRACE {
                     details { summary { "Where this trace lies, by joint and regime" } (map) }

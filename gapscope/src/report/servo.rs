@@ -147,7 +147,7 @@ pub fn html(outcome: &Outcome, beside: &Beside, corrected: &str) -> String {
 fn gauge(diagnosis: &Diagnosis, evidence: &Evidence, beside: &Beside) -> Gauge {
     let gap = &diagnosis.gap.position;
     // Thousandths, unless a joint is off by a whole unit.
-    let scale = if gap.rms.values().all(|rms| *rms < 1.0) { 1e3 } else { 1.0 };
+    let scale = if gap.rms.values().all(|rms| *rms < 0.9995) { 1e3 } else { 1.0 };
     let scaled = |map: &BTreeMap<String, f64>, joint: &str| map.get(joint).map(|rms| scale * rms);
     let figure =
         |map: &BTreeMap<String, f64>, joint: &str| scaled(map, joint).map(|value| Figure { value, ci95: None });
@@ -202,10 +202,10 @@ fn body(
         }
         (section("joints", "Position gap by joint", &weighted(diagnosis), &joints::render(gauge)))
         (section("regimes", "Where the gap lies", &format!("Share of each regime in its joint’s squared position gap, for {}.", gauge.nominal),
-            &heatmap::render(all, &regimes, "Gap by joint and regime", "the joint’s squared position gap", &quiet)))
+            &heatmap::render(all, &regimes, "Gap by joint and regime", "the joint’s squared position gap", &quiet, true)))
         (section("left", "What is left unexplained", "", &html! {
             p { (unexplained(diagnosis)) }
-            (heatmap::render(all, &left, "What is left, by joint and regime", "the square of what is left at the joint", &quiet))
+            (heatmap::render(all, &left, "What is left, by joint and regime", "the square of what is left at the joint", &quiet, false))
         }))
         (section("open", "What these logs leave open", "", &open(diagnosis)))
         @if let Some(why) = why::render(&schema::why(&diagnosis.why), all) {

@@ -3,6 +3,7 @@
 use super::format::{self, percent, plain, with_unit};
 use gapscope_diagnosis::schema::{Bounds, Evidence, Regime, Unexplained, Verdict};
 use gapscope_effects::Kind;
+use maud::{Markup, html};
 
 /// An effect's public name in words, lower case but for names of people.
 pub fn effect(kind: &str) -> String {
@@ -40,7 +41,7 @@ pub fn sentences(text: &str) -> String {
 /// From this probability on another account is at least as likely as the answer.
 const EVEN: f64 = 0.5;
 
-/// How another account does beside the answer, of which the probability knows these two alone.
+/// How well another account fits beside the answer, of which the probability knows these two alone.
 pub fn beside_the_answer(probability: f64) -> String {
     if probability >= EVEN {
         "at least as well as the answer".into()
@@ -290,6 +291,17 @@ pub fn list(items: &[String], last: &str) -> String {
         [rest @ .., end] => format!("{} {last} {end}", rest.join(", ")),
     }
 }
+
+/// A name that may break between its parts, where it is long.
+pub fn breaking(name: &str) -> Markup {
+    html! {
+        @if name.chars().count() <= LONG { (name) }
+        @else { @for part in name.split_inclusive(['_', '/', '-', '.']) { (part) wbr; } }
+    }
+}
+
+/// Characters of a name that fits a column.
+const LONG: usize = 16;
 
 /// First letter upper case.
 pub fn capital(text: &str) -> String {

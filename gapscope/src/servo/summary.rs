@@ -3,7 +3,8 @@
 use crate::report::servo::{angle, answer as three, follows, nominal, schema};
 use crate::report::terminal::{INDENT, Paint, block, clean, column, name, pad, wrap};
 use crate::report::{
-    Beside, count, joint_list, parameter, percent, percent_interval, percent_within, plain as rounded, verdict, with_unit,
+    Beside, count, joint_list, parameter, percent, percent_interval, percent_within, plain as rounded, verdict,
+    with_unit,
 };
 use crate::summary::{faults, ordinary_spaces, regime_rows, rest, ties, told, which};
 use gapscope_diagnosis::schema::Verdict;
@@ -65,15 +66,8 @@ pub fn summary(diagnosis: &Diagnosis, beside: &Beside, out: Option<&Path>, paint
 }
 
 /// What was proposed, and by how much the logs spoke for or against it.
-pub fn why(diagnosis: &Diagnosis) -> String {
-    let mut lines =
-        vec![String::new(), "Why      what was proposed, and by how many nats it won (+) or lost (-)".to_owned()];
-    for why in &diagnosis.why {
-        let word = if why.taken { "taken" } else { "no" };
-        let place = why.joints.join(", ");
-        lines.push(format!("  {word:5}  {:+9.1}  {} at {place}, against {}", why.odds, why.proposed, why.against));
-    }
-    ordinary_spaces(&lines.iter().map(|line| clean(line)).collect::<Vec<_>>())
+pub fn why(diagnosis: &Diagnosis, paint: &Paint) -> String {
+    crate::summary::why(&schema::why(&diagnosis.why), &diagnosis.joints, paint)
 }
 
 /// The evaluation in a few lines: the gap over all logs, by joint and by log.
@@ -168,8 +162,9 @@ fn change(change: &Change) -> String {
     match (change.before, change.after) {
         (Some(before), Some(after)) => {
             let sign = |shrink: f64| if shrink < 0.0 { "+" } else { "−" };
-            let shrink =
-                change.shrink.map_or("at the floor".to_owned(), |s| format!("{}{}", sign(s), percent_within(s.abs(), change.ci95)));
+            let shrink = change
+                .shrink
+                .map_or("at the floor".to_owned(), |s| format!("{}{}", sign(s), percent_within(s.abs(), change.ci95)));
             // Ends of one sign share it.
             let ends = change.ci95.filter(|[low, high]| low * high > 0.0).map(|ends| {
                 let [a, b] = ends.map(f64::abs);

@@ -39,7 +39,10 @@ fn reach(diagnosis: &Diagnosis) -> String {
             angle(before, after)
         ),
         (Some(before), None) => {
-            format!("The arm found here cannot be run free on these logs; {nominal} is off by {}.", angle(before, before))
+            format!(
+                "The arm found here cannot be run free on these logs; {nominal} is off by {}.",
+                angle(before, before)
+            )
         }
         _ => "No arm can be run free on these logs.".into(),
     }
@@ -63,7 +66,8 @@ fn caution(diagnosis: &Diagnosis) -> String {
 
 /// An error of position, rad, in the unit that suits the larger of the two that are told together.
 pub fn angle(value: f64, beside: f64) -> String {
-    let (scale, unit) = if value.max(beside) < 1.0 { (1e3, "mrad") } else { (1.0, "rad") };
+    // What would print as a thousand is a whole one.
+    let (scale, unit) = if value.max(beside) < 0.9995 { (1e3, "mrad") } else { (1.0, "rad") };
     format!("{}\u{a0}{unit}", figure(scale * value))
 }
 

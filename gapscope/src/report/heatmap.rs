@@ -140,7 +140,7 @@ fn whole_percent(share: f64) -> String {
 fn legend(whole: &str) -> Markup {
     html! {
         ul.legend.keys {
-            li { span.key.number aria-hidden="true" { "26" } span { "Share of " (whole) ", %. Regimes overlap, so a row does not add up to 100." } }
+            li { span.key.number aria-hidden="true" { "26" } span { "Share of " (whole) ", %: half the rms is a quarter of the square. Regimes overlap, so a row does not add up to 100." } }
             li { span.key.ramp aria-hidden="true" { i {} } span { "The darker, the more of the gap for its part of the samples; joints at the noise floor stay pale." } }
             li { span.key.marked aria-hidden="true" { "62" small { "7.8×" } } span { "Framed: at least 1.5 times its part of the samples, with the whole 95 % interval. The small figure is that factor." } }
             li.muted { span {} span { "Regimes without bounds in the head have bounds of each joint’s own: pointing at a cell shows them." } }

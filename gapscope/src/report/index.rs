@@ -51,6 +51,7 @@ pub struct Found {
 impl From<&Diagnosis> for Found {
     fn from(found: &Diagnosis) -> Found {
         let [before, after] = gaps(&found.shrink.torque, found.effects.is_empty());
+        let effects = plain::together(found);
         let detail = |e: &gapscope_diagnosis::schema::FoundEffect| {
             let (kind, place) = (words::capital(&words::effect(&e.kind)), words::joints(&e.joints, &found.joints));
             format!("{kind}, {place}, {}\u{202f}% sure", probability_figure(e.confidence))
@@ -59,13 +60,13 @@ impl From<&Diagnosis> for Found {
             robot: found.robot.clone(),
             verdict: words::verdict(found.verdict).into(),
             tone: super::tone_of(found.verdict, found.data.faults.is_empty() && found.data.doubts.is_empty()),
-            effects: found.effects.iter().map(|e| words::effect(&e.kind)).collect(),
-            sure: found.effects.first().map(|e| e.confidence),
+            effects: words::effects(&effects.iter().map(|e| e.kind.clone()).collect::<Vec<_>>()),
+            sure: effects.first().map(|e| e.confidence),
             gap: [before, after].map(|gap| (gap, percent(gap))),
             left: found.unexplained.fraction,
             faults: found.data.faults.iter().map(crate::input::fault_line).collect(),
             answer: plain::answer(found).into(),
-            details: found.effects.iter().map(detail).collect(),
+            details: effects.iter().map(detail).collect(),
         }
     }
 }
@@ -88,7 +89,7 @@ impl From<&gapscope_servo::schema::Diagnosis> for Found {
             robot: found.robot.clone(),
             verdict: words::verdict(verdict).into(),
             tone: super::tone_of(verdict, true),
-            effects: list.map(|e| words::effect(&e.kind)).collect(),
+            effects: words::effects(&list.map(|e| e.kind.clone()).collect::<Vec<_>>()),
             sure: found.effects.first().map(|e| e.confidence),
             answer: super::servo_answer(found).into(),
             gap: gaps,
@@ -110,7 +111,7 @@ struct Cell {
 pub fn page(title: &str, entries: &[Entry], left_out: &[String]) -> String {
     let content = html! {
         header {
-            h1.plain-title { (title) ": " (group(entries.len())) @if entries.len() == 1 { " diagnosis" } @else { " diagnoses" } }
+            h1 { (title) ": " (group(entries.len())) @if entries.len() == 1 { " diagnosis" } @else { " diagnoses" } }
             p.tally {
                 @for (verdict, tone, n) in verdicts(entries) { span class=(tone) { i.spot {} (group(n)) " " (verdict.to_lowercase()) } }
                 @let faulty = entries.iter().filter(|entry| !entry.found.faults.is_empty()).count();
@@ -206,7 +207,7 @@ fn cells(found: &Found) -> Vec<Cell> {
     };
     let mut kinds: Vec<String> = found.effects.iter().take(NAMED).cloned().collect();
     if found.effects.len() > NAMED {
-        kinds.push(format!("{} more", found.effects.len() - NAMED));
+        kinds.push(format!("{}\u{a0}more", found.effects.len() - NAMED));
     }
     let sure = found.sure.map_or(NONE.into(), |sure| format!("{}\u{202f}%", probability_figure(sure)));
     let [(before, before_text), (after, after_text)] = found.gap.clone();

@@ -89,8 +89,10 @@ pub fn picture(gauge: &Gauge, scene: Option<&Scene>) -> Markup {
                 }
                 span.note.needs-script { "Drag to turn it, or use arrow keys. A joint filters the page." }
                 span.rollout-key.legend hidden[true] {
-                    span.swatch.measured {} " robot " span.swatch.before {} " " (gauge.nominal) " "
-                    @if gauge.has_after() { span.swatch.after {} " " (gauge.corrected) }
+                    span.pace {}
+                    span { i.swatch.measured {} " robot" }
+                    span { i.swatch.before {} " " (gauge.nominal) }
+                    @if gauge.has_after() { span { i.swatch.after {} " " (gauge.corrected) } }
                 }
             }
         }

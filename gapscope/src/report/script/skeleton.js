@@ -184,6 +184,8 @@ if (scene && skeleton) {
     if (seen.bottom < 0.5 * seen.height || seen.top > innerHeight - 0.5 * seen.height) skeleton.scrollIntoView({ block: "center" });
     const play = plays.find((play) => play.name === playing);
     document.querySelector(".rollout-key").hidden = !play || play.skeletons.length < 2;
+    const short = (x) => String(Number(x.toPrecision(2)));
+    if (play) document.querySelector(".pace").textContent = short(play.length) + " s" + (play.pace < 0.95 ? ", " + short(1 / play.pace) + " times slower" : "");
     const start = performance.now(), first = frame >= time.length - 1 ? 0 : frame, t0 = time[Math.floor(first)];
     let k = Math.floor(first);
     const step = (now) => {

@@ -1,6 +1,7 @@
 //! The report of a servo arm: the same page as of a robot whose logs hold torque, of position under the set points.
 
 mod answer;
+mod change;
 pub mod schema;
 
 use super::format::{self, percent, percent_interval, percent_within, with_unit};
@@ -140,7 +141,8 @@ pub fn html(outcome: &Outcome, beside: &Beside, corrected: &str) -> String {
         said: answer(diagnosis).into(),
         day: &beside.day,
     };
-    let body = body(&gauge, diagnosis, evidence, beside, corrected, &top);
+    let change = change::render(diagnosis, &outcome.corrected);
+    let body = body(&gauge, diagnosis, evidence, beside, corrected, &top, change);
     super::report(&gauge, &top, beside.scene.as_ref(), &body, &diagnosis.schema)
 }
 
@@ -179,6 +181,7 @@ fn body(
     beside: &Beside,
     corrected: &str,
     top: &Top,
+    change: Option<Markup>,
 ) -> Markup {
     let found = schema::effects(&diagnosis.effects);
     let all = &diagnosis.joints;
@@ -200,6 +203,7 @@ fn body(
             (section("laws", "The law of each effect", "Friction over speed. No data lie behind the curves, as nothing measured the torque; what is no friction has its interval in the table above.",
                 &curves::render(&curves, all, "None of the effects found is friction over speed.")))
         }
+        @if let Some(change) = change { (section("change", "What to change", "", &change)) }
         (section("joints", "Position gap by joint", &weighted(diagnosis), &joints::render(gauge)))
         (section("regimes", "Where the gap lies", &format!("Share of each regime in its joint’s squared position gap, for {}.", gauge.nominal),
             &heatmap::render(all, &regimes, "Gap by joint and regime", "the joint’s squared position gap", &quiet, true)))

@@ -78,7 +78,8 @@ def renew(gapscope, page, folder):
 
     new = BLOCK.sub(block, text)
     if page.name == "README.md":
-        new = DEMO.sub(lambda _: said(gapscope, folder, "gapscope demo --seed 0"), new)
+        with tempfile.TemporaryDirectory() as own:
+            new = DEMO.sub(lambda _: said(gapscope, own, "gapscope demo --seed 0"), new)
     page.write_text(new)
     print(page.name, "renewed" if new != text else "as before", flush=True)
 

@@ -1,7 +1,7 @@
 """Opens pages in headless Chromium, uses them as a person would, and says what is wrong.
 
     pip install playwright==1.56.0                 # the driver alone; the browser is the system's own Chromium
-    python tests/report/browser.py report.html...  [--index] [--shots FOLDER] [--within SECONDS]
+    python tests/report/browser.py report.html...  [--index] [--shots FOLDER] [--within SECONDS] [--picture FILE]
 
 Each page is opened from its folder, without a network, at three sizes, light and dark. Checked: no error on the console,
 no request to anywhere, no sideways scrolling, text readable against what is behind it (WCAG AA). Of a report also: the links
@@ -58,6 +58,7 @@ def main():
     parser.add_argument("pages", nargs="+", type=pathlib.Path)
     parser.add_argument("--index", action="store_true")
     parser.add_argument("--shots", type=pathlib.Path)
+    parser.add_argument("--picture", type=pathlib.Path, help="the first screen of the first page, for the documents")
     parser.add_argument("--within", type=float, help="the longest that a page may take to open, s")
     args = parser.parse_args()
     patience = 120_000  # ms; a machine may be busy
@@ -81,11 +82,21 @@ def main():
             if not args.index:
                 faults += [f"{file}: {fault}" for fault in check_without_script(browser, file)]
                 faults += [f"{file} on paper: {fault}" for fault in check_print(browser, file, args)]
+        if args.picture:
+            picture(browser, args.pages[0], args.picture)
         browser.close()
     for fault in faults:
         print(fault)
     print(f"{len(args.pages)} pages, {len(faults)} faults")
     return 1 if faults else 0
+
+
+def picture(browser, file, out):
+    page = browser.new_context(viewport={"width": 1280, "height": 1000}, offline=True).new_page()
+    page.goto(file.resolve().as_uri())
+    page.wait_for_timeout(150)
+    page.screenshot(path=out)
+    page.context.close()
 
 
 def check(browser, file, size, scheme, args):

@@ -146,7 +146,9 @@ fn faults(faults: &[Fault]) -> String {
 
 /// The strongest effect that the logs cannot tell from another, in words; `None` where there is none.
 pub fn tie(diagnosis: &Diagnosis) -> Option<String> {
-    let next = if diagnosis.next_experiment.is_some() { " The next experiment would." } else { "" };
+    // Where no motion tells them apart, there is a word of advice and no trajectory.
+    let told = diagnosis.next_experiment.as_ref().is_some_and(|next| next.trajectory.is_some());
+    let next = if told { " The next experiment would." } else { "" };
     Some(first_tie(&diagnosis.effects)? + next)
 }
 

@@ -40,7 +40,9 @@ fn values<'a>(page: &'a str, attribute: &str) -> Vec<&'a str> {
 fn plain(path: &Path) -> PathBuf {
     path.components().fold(PathBuf::new(), |mut done, part| {
         match part {
-            Component::ParentDir => drop(done.pop()),
+            Component::ParentDir => {
+                done.pop();
+            }
             Component::CurDir => {}
             part => done.push(part),
         }

@@ -145,7 +145,7 @@ const CONTENTS: [(&str, &str); 18] = [
     ("alternatives", "What else"),
     ("open", "Left open"),
     ("why", "Why"),
-    ("next", "Next experiment"),
+    ("next", "Next"),
     ("power", "Could have shown"),
     ("data", "Data"),
     ("reproduce", "Reproduce"),
@@ -216,7 +216,7 @@ fn header(gauge: &Gauge, top: &Top, scene: Option<&scene::Scene>) -> Markup {
         header #top {
             div.opening {
                 div {
-                    p.kicker { (top.read.in_short()) @if !top.day.is_empty() { " · " (top.day) } }
+                    p.kicker { (top.read.in_short()) @if !top.day.is_empty() { " · " span.nowrap { (top.day) } } }
                     // What is wrong with the logs comes before any verdict on them, and no such verdict is green.
                     @for fault in top.faults { p.fault role="alert" { b { "Fault of the data. " } (ticked(&crate::input::fault_line(fault))) } }
                     @for doubt in top.doubts { p.fault { b { "In doubt. " } (ticked(&words::capital(&doubt.question))) } }

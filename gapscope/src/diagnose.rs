@@ -74,7 +74,7 @@ pub fn run(args: &Diagnose) -> Result<String> {
     }
     let mut text = found.summary(Some(&out), &Paint::here());
     if args.why {
-        text += &found.why();
+        text += &found.why_on(&Paint::here());
     }
     Ok(text)
 }
@@ -163,11 +163,15 @@ impl Found {
         self.summary(None, &Paint::plain())
     }
 
-    /// The comparisons that decided, a line each.
+    /// The comparisons that decided, an entry each, in plain text.
     pub fn why(&self) -> String {
+        self.why_on(&Paint::plain())
+    }
+
+    fn why_on(&self, paint: &Paint) -> String {
         match self {
-            Found::Torque(outcome, _) => summary::why(&outcome.diagnosis),
-            Found::Servo(outcome, _) => servo::why(&outcome.diagnosis),
+            Found::Torque(outcome, _) => summary::why(&outcome.diagnosis.why, &outcome.diagnosis.joints, paint),
+            Found::Servo(outcome, _) => servo::why(&outcome.diagnosis, paint),
         }
     }
 

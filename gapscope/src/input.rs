@@ -125,11 +125,14 @@ pub fn fault_line(fault: &Fault) -> String {
     let joints =
         if fault.joints.is_empty() || named { String::new() } else { format!("{}: ", fault.joints.join(", ")) };
     let done = match (fault.mended, fault.leaves_joints_out()) {
-        (true, _) => "mended here; to mend the log",
-        (false, true) => "left out here; the mend",
-        (false, false) => "taken as logged; the mend",
+        (true, _) => "Mended here; to mend the log",
+        (false, true) => "Left out here; the mend",
+        (false, false) => "Taken as logged; the mend",
     };
-    format!("{files}{joints}{}. {done}: {}", fault.evidence, fault.mend)
+    // A name at the beginning stays as it is.
+    let begins = files.is_empty() && joints.is_empty() && !fault.joints.iter().any(|j| fault.evidence.starts_with(j));
+    let evidence = if begins { crate::report::capital(&fault.evidence) } else { fault.evidence.clone() };
+    format!("{files}{joints}{evidence}. {done}: {}", fault.mend)
 }
 
 /// Reads robot and logs. Joints of which the logs say nothing are held at zero, with a finding.

@@ -40,11 +40,18 @@ impl Progress {
         let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(1000) };
         let (start, total) = (Instant::now(), Arc::new(AtomicU64::new(0)));
         let known = Arc::clone(&total);
-        let left = move |_: &ProgressState, out: &mut dyn Write| {
+        let left = move |state: &ProgressState, out: &mut dyn Write| {
+            let elapsed = start.elapsed();
+            // Of a stage that takes longer than was told nothing is stored: the bar itself tells.
+            let told = match known.load(Ordering::Relaxed) {
+                0 => whole(state.pos() as f64 / 1000.0, elapsed),
+                told => told,
+            };
             // A line that cannot be written is none.
-            let _ = out.write_str(&in_words(known.load(Ordering::Relaxed), start.elapsed()));
+            let _ = out.write_str(&in_words(told, elapsed));
         };
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  {left}{msg}") {
+        // The message is cut where the terminal ends: a second line would stay behind.
+        if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3} %  {left}{wide_msg}") {
             bar.set_style(style.with_key("left", left));
         }
         if !bar.is_hidden() {
@@ -59,10 +66,7 @@ impl Progress {
         let forward = (1000.0 * share) as u64 > self.bar.position();
         if forward {
             self.bar.set_position((1000.0 * share) as u64);
-            let elapsed = self.start.elapsed();
-            if share >= KNOWN.0 && elapsed >= KNOWN.1 {
-                self.total.store((elapsed.as_millis() as f64 / share) as u64, Ordering::Relaxed);
-            }
+            self.total.store(whole(share, self.start.elapsed()), Ordering::Relaxed);
         }
         self.bar.set_message(stage.to_owned());
     }
@@ -79,6 +83,11 @@ fn share(stage: &str, part: f64) -> f64 {
     let known = BEGINS.iter().find(|(name, _)| *name == stage).map(|(_, share)| *share);
     let turns = || (stage == refining).then(|| from + (to - from) * ((part - first) / (last - first)).clamp(0.0, 1.0));
     known.or_else(turns).unwrap_or(part).clamp(0.0, 1.0)
+}
+
+/// How long the whole takes of which this part is over, ms; 0 as long as nothing tells.
+fn whole(share: f64, elapsed: Duration) -> u64 {
+    if share >= KNOWN.0 && elapsed >= KNOWN.1 { (elapsed.as_millis() as f64 / share) as u64 } else { 0 }
 }
 
 /// `about 40 s left  `; nothing as long as nothing tells.
@@ -129,6 +138,8 @@ mod tests {
     fn time_left_is_told_once_it_is_known() {
         let told = |total: u64, elapsed: u64| in_words(total, Duration::from_secs(elapsed));
         assert_eq!(told(0, 10), "");
+        assert_eq!(whole(0.5, Duration::from_secs(1)), 0);
+        assert_eq!(whole(0.8, Duration::from_secs(8)), 10_000);
         assert_eq!(told(60_000, 20), "about 40 s left  ");
         assert_eq!(told(60_000, 70), "a few seconds left  ");
         assert_eq!(told(600_000, 60), "about 9 min left  ");

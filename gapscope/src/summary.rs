@@ -8,9 +8,9 @@ use crate::input::fault_line;
 use crate::report::plain;
 use crate::report::terminal::{INDENT, Paint, block, blocks, clean, column, fill, name as padded, pad, wrap};
 use crate::report::{
-    capital, changed, count, effect, effects, figure, headline, implied_unit, in_words, interval, is_above_floor,
-    largest, list, motion_unit, outstanding, percent, percent_figure, plain as rounded, power_line, regime,
-    significant, verdict, with_unit, words_of_the_rest,
+    beside_the_answer, capital, changed, count, effect, effects, figure, headline, implied_unit, in_words, interval,
+    is_above_floor, joint_list, largest, list, motion_unit, outstanding, percent, percent_figure, plain as rounded,
+    power_line, regime, sentences, significant, verdict, with_unit, words_of_the_rest,
 };
 use change::Cells;
 use gapscope_datasets::{Doubt, Fault};
@@ -94,7 +94,7 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
         block(&mut lines, paint, "Power", &[line]);
     }
     if let Some(next) = &diagnosis.next_experiment {
-        block(&mut lines, paint, "Next", &[clean(&in_words(&next.motion))]);
+        block(&mut lines, paint, "Next", &[clean(&sentences(&in_words(&next.motion)))]);
     }
     let mut text = ordinary_spaces(&lines);
     if let Some(out) = out {
@@ -116,21 +116,26 @@ pub fn ties(found: &[FoundEffect]) -> Vec<String> {
     lines
 }
 
-/// What was proposed, against what, and by how much the logs spoke for it or against it: one line a comparison.
-pub fn why(diagnosis: &Diagnosis) -> String {
-    let mut lines = vec![
-        String::new(),
-        "Why      what was proposed, against what, and by how many nats it won (+) or lost (-);".to_owned(),
-        "         3 nats are odds of twenty to one".to_owned(),
-    ];
-    let mut all: Vec<&Why> = diagnosis.why.iter().collect();
+/// What was proposed, against what, and by how much the logs spoke for it or against it: one entry a comparison.
+pub fn why(list: &[Why], joints: &[String], paint: &Paint) -> String {
+    let mut lines = vec![String::new()];
+    let head = "what was proposed, against what, and by how many nats it won (+) or lost (−); 3 nats are odds of twenty to one";
+    let rows: Vec<String> = wrap(head, paint.width - INDENT);
+    block(&mut lines, paint, "Why", &rows);
+    let mut all: Vec<&Why> = list.iter().collect();
     all.sort_by(|a, b| b.taken.cmp(&a.taken).then(b.odds.total_cmp(&a.odds)));
-    for Why { proposed, joints, against, odds, taken } in all {
-        let word = if *taken { "taken" } else { "no" };
-        let place = if joints.is_empty() { String::new() } else { format!(" at {}", joints.join(", ")) };
-        lines.push(format!("  {word:5}  {odds:+9.1}  {proposed}{place}, against {against}"));
+    for Why { proposed, joints: at, against, odds, taken } in all {
+        let odds = format!("{odds:+.1}").replace('-', "−");
+        let place = if at.is_empty() { String::new() } else { format!(" at {}", joint_list(at, joints)) };
+        let text = clean(&format!("{}{place}, against {}", effect(proposed), in_words(against)));
+        // The kind in words; its public name stands in diagnosis.json.
+        let before = format!("  {:5}  {}  ", if *taken { "taken" } else { "no" }, fill(&odds, 9));
+        let columns = before.chars().count();
+        for (i, line) in wrap(&text, paint.width.saturating_sub(columns)).into_iter().enumerate() {
+            lines.push(if i == 0 { before.clone() + &line } else { " ".repeat(columns) + &line });
+        }
     }
-    lines.iter().map(|line| format!("{line}\n")).collect()
+    ordinary_spaces(&lines)
 }
 
 /// The evaluation in a few lines: the gap over all logs, before and after, then log by log.
@@ -278,10 +283,7 @@ fn notes(diagnosis: &Diagnosis, terminal: bool) -> Vec<String> {
     if let Some(other) = best.filter(|a| a.probability >= 0.05) {
         let kinds: Vec<String> = other.effects.iter().map(|kind| effect(kind)).collect();
         let kinds = if kinds.is_empty() { "no effect at all".into() } else { kinds.join(" + ") };
-        rows.push(clean(&format!(
-            "instead of all these, with a probability of {}: {kinds}",
-            percent(other.probability)
-        )));
+        rows.push(clean(&format!("instead of all these, {kinds} fits {}", beside_the_answer(other.probability))));
     }
     if matches!(diagnosis.verdict, Verdict::PartlyExplained | Verdict::UnknownEffect) {
         rows.push(clean(&words_of_the_rest(&diagnosis.unexplained, &diagnosis.joints)));

@@ -1,11 +1,11 @@
 """Opens pages in headless Chromium, uses them as a person would, and says what is wrong.
 
     pip install playwright==1.56.0                 # the driver alone; the browser is the system's own Chromium
-    python tests/report/browser.py report.html...  [--index] [--shots FOLDER] [--within SECONDS]
+    python tests/report/browser.py report.html...  [--index] [--shots FOLDER] [--within SECONDS] [--picture FILE]
 
 Each page is opened from its folder, without a network, at three sizes, light and dark. Checked: no error on the console,
-no request to anywhere, no sideways scrolling, text readable against what is behind it (WCAG AA). Of a report also: turning
-the robot, the filter by joint and the zoom, by pointer and by key, what plays, that it says the same without JavaScript, and
+no request to anywhere, no sideways scrolling, text readable against what is behind it (WCAG AA). Of a report also: the links
+to its sections, turning the robot, the filter by joint and the zoom, by pointer and by key, what plays, that it says the same without JavaScript, and
 how it prints.
 With --index the page is one that `gapscope report` wrote. Exit status 0 if all is well, 1 if not, 77 if there is no browser.
 """
@@ -58,6 +58,7 @@ def main():
     parser.add_argument("pages", nargs="+", type=pathlib.Path)
     parser.add_argument("--index", action="store_true")
     parser.add_argument("--shots", type=pathlib.Path)
+    parser.add_argument("--picture", type=pathlib.Path, help="the first screen of the first page, for the documents")
     parser.add_argument("--within", type=float, help="the longest that a page may take to open, s")
     args = parser.parse_args()
     patience = 120_000  # ms; a machine may be busy
@@ -81,11 +82,21 @@ def main():
             if not args.index:
                 faults += [f"{file}: {fault}" for fault in check_without_script(browser, file)]
                 faults += [f"{file} on paper: {fault}" for fault in check_print(browser, file, args)]
+        if args.picture:
+            picture(browser, args.pages[0], args.picture)
         browser.close()
     for fault in faults:
         print(fault)
     print(f"{len(args.pages)} pages, {len(faults)} faults")
     return 1 if faults else 0
+
+
+def picture(browser, file, out):
+    page = browser.new_context(viewport={"width": 1280, "height": 1000}, offline=True).new_page()
+    page.goto(file.resolve().as_uri())
+    page.wait_for_timeout(150)
+    page.screenshot(path=out)
+    page.context.close()
 
 
 def check(browser, file, size, scheme, args):
@@ -121,9 +132,13 @@ def check(browser, file, size, scheme, args):
 
 
 def use_report(page):
-    faults = []
+    faults = use_contents(page)
     chart = page.locator("#live .chart")
     if chart.count():
+        # Measured, model and corrected torque are what the page is opened for.
+        top, screen = page.evaluate(f"{WHERE}('#live .chart') + scrollY"), page.viewport_size["height"]
+        if top > 1.5 * screen:
+            faults.append(f"the lines begin at {top:.0f} px, on a screen of {screen} px")
         chart.scroll_into_view_if_needed()
         span = "(() => { const b = document.querySelector('#live .chart'); return b.dataset.to - b.dataset.from; })()"
         chart.focus()
@@ -153,9 +168,16 @@ def use_report(page):
         if page.evaluate(ticks(page)) == before:
             faults.append("dragging does not zoom")
         page.locator("[data-zoom=all]").click()
+    for button in page.locator("[data-copy]").all()[:2]:
+        button.scroll_into_view_if_needed()
+        button.focus()
+        page.keyboard.press("Enter")
+        page.wait_for_timeout(30)
+        if button.inner_text() == "Copy":
+            faults.append("nothing is copied or selected")
     chips = page.locator("[data-pick]")
     filtered = "[...document.querySelectorAll('[data-joints]')].filter((e) => e.classList.contains('filtered')).length"
-    if chips.count() > 1:
+    if chips.count() > 1 and page.locator("[data-joints]").count():
         chips.nth(1).click()
         if not page.evaluate(filtered) or not page.locator("#filter").is_visible():
             faults.append("a joint of the list filters nothing")
@@ -217,6 +239,32 @@ def use_report(page):
             if button.inner_text() != name:
                 faults.append(f"{name}: Enter does not stop it")
     return faults
+
+
+def use_contents(page):
+    """Each link of the line of sections leads there, by pointer and by key, and the line stays in sight."""
+    faults = []
+    page.evaluate("scrollTo(0, 0)")
+    for i, link in enumerate(page.locator(".contents a").all()):
+        place = link.get_attribute("href")
+        if i % 2:
+            link.focus()
+            page.keyboard.press("Enter")
+        else:
+            link.click()
+        page.wait_for_timeout(60)
+        at, height = page.evaluate(f"{WHERE}('{place}')"), page.viewport_size["height"]
+        end = page.evaluate("scrollY + innerHeight >= document.documentElement.scrollHeight - 2")
+        if not (-2 <= at < 0.2 * height or end and at < height):
+            faults.append(f"the link {place} leads to {at:.0f} px")
+        if place != "#top" and not in_sight(page, ".contents"):
+            faults.append(f"at {place} the links are out of sight")
+    page.evaluate("history.replaceState(null, '', location.pathname)")
+    return faults
+
+
+# How far below the upper edge of the screen an element begins, px.
+WHERE = "((name) => document.querySelector(name).getBoundingClientRect().top)"
 
 
 def in_sight(page, selector):

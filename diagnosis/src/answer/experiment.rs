@@ -110,7 +110,10 @@ pub fn next_experiment(
     let tied = found.iter().find(|e| !e.indistinguishable_from.is_empty());
     let rival = tied.and_then(|tied| rivals.iter().find(|r| r.without.name() == tied.kind));
     let (Some(tied), Some(rival)) = (tied, rival) else { return Ok(None) };
-    let other = tied.indistinguishable_from.join(" or ");
+    let other = match tied.indistinguishable_from.as_slice() {
+        [rest @ .., last] if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        names => names.concat(),
+    };
     let separates = std::iter::once(&tied.kind).chain(&tied.indistinguishable_from).cloned().collect();
     let why = format!("{} and {other} predict these logs equally well", tied.kind);
     let pair = Pair::new(problem, &choice.set, &rival.choice.set);
@@ -126,8 +129,8 @@ pub fn next_experiment(
     let proposal = match best {
         Some((separation, design, trajectory)) if separation >= CLEAR.get() => {
             let motion = format!(
-                "follow {FILE} (look for collisions first): {}. {} and {other} would then lie {separation:.0} standard \
-                 errors apart",
+                "follow {FILE} (look for collisions first): {}. {} would then lie {separation:.0} standard errors from \
+                 {other}",
                 design.words(data.model),
                 tied.kind,
             );

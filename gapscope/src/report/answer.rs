@@ -1,8 +1,8 @@
 //! The answer in three sentences: where, which, how far.
 
 use super::format::{
-    count, estimate, numbers, percent, percent_interval, plain, probability_figure, significant, span, with_interval,
-    with_unit,
+    count, estimate, numbers, percent, percent_interval, percent_within, plain, probability_figure, significant, span,
+    with_interval, with_unit,
 };
 use super::words;
 use gapscope_diagnosis::schema::{Change, Diagnosis, Estimate, Evidence, FoundEffect, Parameter, Regime, Verdict};
@@ -100,7 +100,8 @@ fn how_far(diagnosis: &Diagnosis) -> String {
         }
         _ => {}
     }
-    let added = if diagnosis.effects.len() == 1 { "With it added" } else { "With these added" };
+    let added =
+        if diagnosis.effects.len() == 1 { "With the effect in the model" } else { "With the effects in the model" };
     let rollout = diagnosis.shrink.rollout.last().and_then(|h| {
         Some(format!(
             ", and the position error of {} s rollouts {}",
@@ -123,11 +124,12 @@ fn how_far(diagnosis: &Diagnosis) -> String {
 
 /// `shrinks by 93 % (95 % interval 92–94 %)`, or `grows by`.
 fn shrinks(shrink: f64, interval: Option<[f64; 2]>) -> String {
-    let interval = interval.map_or(String::new(), |ends| format!(" (95\u{202f}% interval {})", percent_interval(ends)));
+    let ends = interval;
+    let interval = ends.map_or(String::new(), |ends| format!(" (95\u{202f}% interval {})", percent_interval(ends)));
     if shrink < 0.0 {
         format!("grows by {}{}", percent(-shrink), interval.replace("interval", "interval of the shrink"))
     } else {
-        format!("shrinks by {}{interval}", percent(shrink))
+        format!("shrinks by {}{interval}", percent_within(shrink, ends))
     }
 }
 
@@ -210,7 +212,8 @@ fn one(single: &Estimate) -> Option<String> {
 
 /// One line for a headline: `2 effects explain the gap`.
 pub fn headline(diagnosis: &Diagnosis) -> String {
-    let n = diagnosis.effects.len();
+    // As many as the lists hold.
+    let n = super::plain::together(diagnosis).len();
     let verb = if n == 1 { "explains" } else { "explain" };
     match diagnosis.verdict {
         Verdict::Explained if n > 0 => format!("{} {verb} the gap between model and robot.", count(n, "effect")),

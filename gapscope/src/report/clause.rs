@@ -85,10 +85,12 @@ pub fn of(effect: &FoundEffect, all: &[String], sums: &[Combination]) -> String 
             mass => s.does("carries ", "carry ") + &mass.unwrap_or("a body".into()) + " that the model lacks",
         },
         "link_inertia_error" => {
-            let surest = sums.iter().find(|sum| sum.differs());
-            let size = surest.map_or(String::new(), |sum| format!(": {}", combination(sum)));
-            let (link, is, it) = (s.by("link", "links"), s.by("is", "are"), s.by("it", "them"));
-            format!("The {link} of {place} {is} not as the model has {it}{size}")
+            let (link, is) = (s.by("link", "links"), s.by("is", "are"));
+            // A mass is a word that needs no manual; moments stand in the table.
+            match sums.iter().find(|sum| sum.differs()).filter(|sum| sum.unit == "kg") {
+                Some(sum) => format!("The {link} of {place} {is} not as in the model: {}", combination(sum)),
+                None => format!("The {link} of {place} {is} heavier, lighter or balanced otherwise than in the model"),
+            }
         }
         "armature" => s.lacking(&s.does("turns a rotor", "turn rotors"), "armature", "rotor inertia"),
         "gravity_misalignment" => "The base is tilted, and the model takes it to be level".into(),

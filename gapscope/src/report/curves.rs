@@ -104,7 +104,7 @@ fn curve(curve: &EffectCurve, most: usize) -> Markup {
     };
     html! {
         figure data-joints=(super::listed(std::slice::from_ref(&curve.joint))) {
-            figcaption { b { (name) } span.name title=(curve.joint) { (curve.joint) } }
+            figcaption { b { (name) } span.name title=(curve.joint) { (words::breaking(&curve.joint)) } }
             (Plot {
                 description: format!("{name} at {}: {behind}, torque in {unit} over {}", curve.joint, curve.x_label),
                 marks: html! {

@@ -1,7 +1,7 @@
 //! The table of effects found: what, where, how sure, how much.
 
 use super::chart::short;
-use super::format::{self, percent, percent_interval, with_unit};
+use super::format::{self, percent_interval, percent_within, with_unit};
 use super::words;
 use gapscope_diagnosis::schema::{Estimate, FoundEffect, Parameter};
 use maud::{Markup, html};
@@ -49,7 +49,7 @@ fn row(effect: &FoundEffect, all: &[String], shrinks: &str) -> Markup {
                 td.number data-label=(shrinks) {
                     @let grows = effect.shrink.torque.is_some_and(|part| part < 0.0);
                     @if grows { "grows by " }
-                    (effect.shrink.torque.map_or(unknown.into(), |part| percent(part.abs())))
+                    (effect.shrink.torque.map_or(unknown.into(), |part| percent_within(part.abs(), effect.shrink.ci95)))
                     @if let Some([low, high]) = effect.shrink.ci95 {
                         " " span.muted.nowrap { (percent_interval(if grows { [-high, -low] } else { [low, high] })) }
                     }
@@ -108,7 +108,7 @@ fn joint_table(parameters: &[(&String, &BTreeMap<String, Estimate>)], all: &[Str
             tbody {
                 @for joint in joints {
                     tr {
-                        th scope="row" { span.name { (joint) } }
+                        th scope="row" { span.name { (words::breaking(joint)) } }
                         @for (_, map) in parameters {
                             td.number {
                                 @match map.get(joint) {

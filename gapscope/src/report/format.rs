@@ -104,6 +104,20 @@ pub fn probability_figure(part: f64) -> String {
     percent_figure(if part > 0.9996 { 0.9996 } else { part })
 }
 
+/// A part of one as percent, to as many digits as its interval has: 99.4 % within 99.3–99.4 %, not 99 %.
+pub fn percent_within(part: f64, interval: Option<[f64; 2]>) -> String {
+    let whole = !part.is_finite() || !(0.0995..0.9995).contains(&part.abs());
+    match interval.filter(|ends| !whole && decimals(*ends) > 0) {
+        Some(ends) => format!("{}\u{202f}%", fixed(100.0 * part, decimals(ends))),
+        None => percent(part),
+    }
+}
+
+/// Decimals of the ends of an interval of parts, as percent: one where whole numbers would coincide.
+fn decimals([from, to]: [f64; 2]) -> i32 {
+    i32::from((100.0 * (to - from)).abs() < 1.5)
+}
+
 /// An interval of parts as percent: `92–94 %`; one decimal where whole numbers would coincide.
 pub fn percent_interval(interval: [f64; 2]) -> String {
     let [from, to] = interval;
@@ -113,7 +127,7 @@ pub fn percent_interval(interval: [f64; 2]) -> String {
     if from.min(to) > 0.9995 && to <= 1.0 {
         return ">99.9\u{202f}%".into();
     }
-    let decimals = i32::from((100.0 * (to - from)).abs() < 1.5);
+    let decimals = decimals(interval);
     let (from, to) = (fixed(100.0 * from, decimals), fixed(100.0 * to, decimals));
     format!("{}\u{202f}%", range(&from, &to))
 }
@@ -250,7 +264,7 @@ impl Scale {
         if !value.is_finite() {
             return NONE.into();
         }
-        if size == 0.0 || !size.is_finite() {
+        if value == 0.0 || size == 0.0 || !size.is_finite() {
             return figure(value);
         }
         let exponent = magnitude(size);

@@ -59,20 +59,26 @@ impl Gauge {
             Some(Figure { value: *gap.rms.get(joint)?, ci95: gap.ci95.get(joint).copied() })
         };
         let before = &diagnosis.gap.torque;
+        let remaining = evidence.remaining.as_ref().filter(|_| !diagnosis.effects.is_empty());
         let joint = |name: &String| JointGap {
             name: name.clone(),
             unit: words::torque_unit(name, evidence, &diagnosis.gap.regimes).to_owned(),
             before: figure(before, name),
-            after: evidence.remaining.as_ref().and_then(|gap| figure(&gap.torque, name)),
+            after: remaining.and_then(|gap| figure(&gap.torque, name)),
             floor: before.floor.get(name).copied(),
         };
+        let mut series: Vec<Series> = evidence.torque.iter().filter(|s| !s.time.is_empty()).cloned().collect();
+        if diagnosis.effects.is_empty() {
+            // A model with no effects is the model as described.
+            series.iter_mut().for_each(|lines| lines.corrected.clear());
+        }
         Gauge {
             what: "torque",
             nominal: "model as described",
             corrected: "model with the effects",
             robot: diagnosis.robot.clone(),
             joints: diagnosis.joints.iter().map(joint).collect(),
-            series: evidence.torque.iter().filter(|s| !s.time.is_empty()).cloned().collect(),
+            series,
         }
     }
 

@@ -6,9 +6,6 @@ use crate::picture::{Cell, Matrix};
 use gapscope_diagnosis::schema::Regime;
 use maud::{Markup, html};
 
-/// Behind the quantity of a column whose bounds differ between joints.
-const BY_JOINT: &str = ", by joint";
-
 /// Columns under one regime's name.
 struct Group<'a> {
     name: &'a str,
@@ -17,20 +14,21 @@ struct Group<'a> {
 
 /// One regime with one set of bounds; where bounds differ between joints, the n-th of its name.
 struct Column<'a> {
-    /// Bounds for the heading.
+    /// Bounds for the heading; none where they differ between joints.
     heading: String,
     /// One cell for each joint.
     cells: Vec<Option<&'a Regime>>,
 }
 
 /// The heat map, or a sentence where there is nothing to show; `whole` says what the shares are parts of, `quiet` which
-/// joints are at the noise floor and stay pale.
+/// joints are at the noise floor and stay pale. The `first` map of a page explains its signs.
 pub fn render(
     joints: &[String],
     regimes: &[Regime],
     caption: &str,
     whole: &str,
     quiet: &dyn Fn(&str) -> bool,
+    first: bool,
 ) -> Markup {
     let joints: Vec<&String> = joints.iter().filter(|joint| regimes.iter().any(|r| r.joint == **joint)).collect();
     let groups = groups(&joints, regimes);
@@ -59,7 +57,7 @@ pub fn render(
                 tbody {
                     @for (row, joint) in joints.iter().enumerate() {
                         tr.quiet[quiet(joint)] data-joints=(super::listed(std::slice::from_ref(*joint))) {
-                            th scope="row" { span { (joint) @if quiet(joint) { small { "at the noise" } } } }
+                            th scope="row" { span { (words::breaking(joint)) @if quiet(joint) { small { "at the noise" } } } }
                             @for group in &groups {
                                 @for (i, column) in group.columns.iter().enumerate() {
                                     (cell(column.cells.get(row).copied().flatten(), i == 0, quiet(joint)))
@@ -70,7 +68,7 @@ pub fn render(
                 }
             }
         }
-        (legend(whole))
+        @if first { (legend(whole)) } @else { p.legend { "Share of " (whole) ", %; shade and frame as in the table of the whole gap." } }
     }
 }
 
@@ -82,11 +80,8 @@ pub fn picture(title: &str, joints: &[String], regimes: &[Regime]) -> Option<Str
     if columns.is_empty() {
         return None;
     }
-    // Bounds of each joint's own are for the table.
-    let bounds =
-        |heading: &str| if heading.ends_with(BY_JOINT) { String::new() } else { heading.replace('\u{2060}', "") };
     let name = |(name, column): &(&str, &Column)| {
-        format!("{} {}", words::regime(name), bounds(&column.heading)).trim_end().to_owned()
+        format!("{} {}", words::regime(name), column.heading.replace('\u{2060}', "")).trim_end().to_owned()
     };
     let names: Vec<String> = columns.iter().map(name).collect();
     let cell = |regime: &Regime| Cell {
@@ -144,14 +139,11 @@ fn whole_percent(share: f64) -> String {
 
 fn legend(whole: &str) -> Markup {
     html! {
-        p.legend {
-            "Figures: share of " (whole) ", %. "
-            span.ramp aria-hidden="true" { "0" i {} "100" }
-            " shade: by how much the share exceeds the regime’s part of the samples. "
-            span.key aria-hidden="true" { "62" small { "7.8×" } }
-            " framed: at least 1.5 times that part, with the whole 95 % interval above; the small figure is share ÷ samples. "
-            "Regimes overlap, so a row does not add up to 100. Shares are of the square: half the rms is a quarter of it. "
-            "Joints at the noise floor stay pale."
+        ul.legend.keys {
+            li { span.key.number aria-hidden="true" { "26" } span { "Share of " (whole) ", %: half the rms is a quarter of the square. Regimes overlap, so a row does not add up to 100." } }
+            li { span.key.ramp aria-hidden="true" { i {} } span { "The darker, the more of the gap for its part of the samples; joints at the noise floor stay pale." } }
+            li { span.key.marked aria-hidden="true" { "62" small { "7.8×" } } span { "Framed: at least 1.5 times its part of the samples, with the whole 95 % interval. The small figure is that factor." } }
+            li.muted { span {} span { "Regimes without bounds in the head have bounds of each joint’s own: pointing at a cell shows them." } }
         }
     }
 }
@@ -181,8 +173,8 @@ fn columns<'a>(name: &str, joints: &[&String], regimes: &'a [Regime]) -> Vec<Col
             let heading = match bounds.as_slice() {
                 [one] => words::interval(one).replace('–', "–\u{2060}").replace('\u{a0}', " "),
                 _ if count > 1 => format!("{} of {count}", i + 1),
-                [one, ..] => one.quantity.replace('_', " ") + BY_JOINT,
-                [] => String::new(),
+                // Each joint has its own: the tip of a cell says them.
+                _ => String::new(),
             };
             Column { heading, cells }
         })

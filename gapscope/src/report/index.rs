@@ -1,13 +1,17 @@
 //! An index over many diagnoses: one page with a table to sort and filter, and any two side by side.
 
-use super::format::{NONE, count, figure, percent, probability_figure};
+use super::format::{NONE, group, percent, probability_figure};
 use super::{plain, ticked, words};
-use gapscope_diagnosis::schema::{Change, Diagnosis};
+use gapscope_diagnosis::schema::{Change, Diagnosis, Verdict};
 use maud::{Markup, PreEscaped, html};
 
 const SCRIPT: &str = include_str!("script/index.js");
 /// Effects that a row names; the two side by side have them all.
 const NAMED: usize = 3;
+
+/// Headings; figures from the fifth on.
+const HEADS: [&str; 9] =
+    ["diagnosis", "robot", "verdict", "effects", "sure", "gap before", "gap after", "unexplained", "faults"];
 
 /// One diagnosis of the index.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,8 +29,9 @@ pub struct Entry {
 pub struct Found {
     /// Name of the robot.
     pub robot: String,
-    /// The verdict in words.
+    /// The verdict in words, and the class of its colour.
     pub verdict: String,
+    pub tone: &'static str,
     /// Effects in words, strongest first.
     pub effects: Vec<String>,
     /// Confidence of the strongest.
@@ -46,6 +51,7 @@ pub struct Found {
 impl From<&Diagnosis> for Found {
     fn from(found: &Diagnosis) -> Found {
         let [before, after] = gaps(&found.shrink.torque, found.effects.is_empty());
+        let effects = plain::together(found);
         let detail = |e: &gapscope_diagnosis::schema::FoundEffect| {
             let (kind, place) = (words::capital(&words::effect(&e.kind)), words::joints(&e.joints, &found.joints));
             format!("{kind}, {place}, {}\u{202f}% sure", probability_figure(e.confidence))
@@ -53,13 +59,14 @@ impl From<&Diagnosis> for Found {
         Found {
             robot: found.robot.clone(),
             verdict: words::verdict(found.verdict).into(),
-            effects: found.effects.iter().map(|e| words::effect(&e.kind)).collect(),
-            sure: found.effects.first().map(|e| e.confidence),
+            tone: super::tone_of(found.verdict, found.data.faults.is_empty() && found.data.doubts.is_empty()),
+            effects: words::effects(&effects.iter().map(|e| e.kind.clone()).collect::<Vec<_>>()),
+            sure: effects.first().map(|e| e.confidence),
             gap: [before, after].map(|gap| (gap, percent(gap))),
             left: found.unexplained.fraction,
             faults: found.data.faults.iter().map(crate::input::fault_line).collect(),
             answer: plain::answer(found).into(),
-            details: found.effects.iter().map(detail).collect(),
+            details: effects.iter().map(detail).collect(),
         }
     }
 }
@@ -67,11 +74,11 @@ impl From<&Diagnosis> for Found {
 impl From<&gapscope_servo::schema::Diagnosis> for Found {
     fn from(found: &gapscope_servo::schema::Diagnosis) -> Found {
         let change = &found.shrink.position;
-        let gap = |gap: Option<f64>| {
-            let gap = gap.unwrap_or(f64::NAN);
-            (gap, if gap.is_finite() { format!("{} mrad", figure(1e3 * gap)) } else { NONE.into() })
-        };
-        let gaps = [gap(change.before), gap(change.after)];
+        let [before, after] = [change.before, change.after].map(|gap| gap.unwrap_or(f64::NAN));
+        let gap =
+            |gap: f64, beside: f64| (gap, if gap.is_finite() { super::servo::angle(gap, beside) } else { NONE.into() });
+        let gaps = [gap(before, after), gap(after, before)];
+        let verdict = super::servo::schema::verdict(&found.verdict);
         let list = found.effects.iter();
         let detail = |e: &gapscope_servo::schema::FoundEffect| {
             let (kind, place) = (words::capital(&words::effect(&e.kind)), words::joints(&e.joints, &found.joints));
@@ -80,8 +87,9 @@ impl From<&gapscope_servo::schema::Diagnosis> for Found {
         let details: Vec<String> = list.clone().map(detail).collect();
         Found {
             robot: found.robot.clone(),
-            verdict: words::capital(&found.verdict.replace('_', " ")),
-            effects: list.map(|e| words::effect(&e.kind)).collect(),
+            verdict: words::verdict(verdict).into(),
+            tone: super::tone_of(verdict, true),
+            effects: words::effects(&list.map(|e| e.kind.clone()).collect::<Vec<_>>()),
             sure: found.effects.first().map(|e| e.confidence),
             answer: super::servo_answer(found).into(),
             gap: gaps,
@@ -101,11 +109,14 @@ struct Cell {
 
 /// The page. `left_out` says in words which files could not be read.
 pub fn page(title: &str, entries: &[Entry], left_out: &[String]) -> String {
-    let heads =
-        ["diagnosis", "robot", "verdict", "effects", "sure", "gap before", "gap after", "unexplained", "faults"];
     let content = html! {
         header {
-            p.kicker { b { (title) } " · " (count(entries.len(), "diagnosis").replace("diagnosiss", "diagnoses")) }
+            h1 { (title) ": " (group(entries.len())) @if entries.len() == 1 { " diagnosis" } @else { " diagnoses" } }
+            p.tally {
+                @for (verdict, tone, n) in verdicts(entries) { span class=(tone) { i.spot {} (group(n)) " " (verdict.to_lowercase()) } }
+                @let faulty = entries.iter().filter(|entry| !entry.found.faults.is_empty()).count();
+                @if faulty > 0 { span.partly { (group(faulty)) " with faults of the data" } }
+            }
             @for text in left_out { p.fault { (text) } }
         }
         main {
@@ -113,7 +124,7 @@ pub fn page(title: &str, entries: &[Entry], left_out: &[String]) -> String {
                 label { "find " input id="find" type="search" placeholder="name, robot, effect"; }
                 label { "verdict " select id="verdict" {
                     option value="" { "all" }
-                    @for verdict in verdicts(entries) { option { (verdict) } }
+                    @for (verdict, ..) in verdicts(entries) { option { (verdict) } }
                 } }
                 span #shown role="status" {}
             }
@@ -123,14 +134,14 @@ pub fn page(title: &str, entries: &[Entry], left_out: &[String]) -> String {
                 table #diagnoses .plain {
                     thead { tr {
                         th.needs-script scope="col" { span.sr { "side by side" } }
-                        @for (i, head) in heads.iter().enumerate() {
+                        @for (i, head) in HEADS.iter().enumerate() {
                             th.number[i >= 4] scope="col" { button type="button" data-column=(i) { (head) } }
                         }
                     } }
                     tbody { @for (i, entry) in entries.iter().enumerate() { (row(i, entry)) } }
                 }
             }
-            p.note { "Torque gap: weighted rms, parts of the effort’s spread, on held-out data. Unexplained: of the squared gap." }
+            p.note { "Gap of the torque: weighted rms, parts of the effort’s spread, on held-out data; of an arm without torque: the angle by which its free run is off. Unexplained: of the squared gap." }
             details { summary { "All answers in words" } div #answers { @for (i, entry) in entries.iter().enumerate() { (card(i, entry)) } } }
         }
         script { (PreEscaped(SCRIPT)) }
@@ -138,11 +149,15 @@ pub fn page(title: &str, entries: &[Entry], left_out: &[String]) -> String {
     super::page(title, &content, "gapscope.index/1")
 }
 
-fn verdicts(entries: &[Entry]) -> Vec<&str> {
-    let mut list: Vec<&str> = entries.iter().map(|e| e.found.verdict.as_str()).collect();
-    list.sort_unstable();
-    list.dedup();
-    list
+/// Each verdict that occurs, the class of its colour, and how often; in their usual order.
+fn verdicts(entries: &[Entry]) -> Vec<(&'static str, &'static str, usize)> {
+    use Verdict::{Explained, NoGap, NotExcited, PartlyExplained, UnknownEffect};
+    let of = |verdict| {
+        let name = words::verdict(verdict);
+        (name, super::tone_of(verdict, true), entries.iter().filter(|entry| entry.found.verdict == name).count())
+    };
+    let all = [NoGap, Explained, PartlyExplained, UnknownEffect, NotExcited].map(of);
+    all.into_iter().filter(|(.., n)| *n > 0).collect()
 }
 
 fn name(entry: &Entry) -> &str {
@@ -156,7 +171,12 @@ fn row(i: usize, entry: &Entry) -> Markup {
         tr data-name=(name(entry)) data-verdict=(found.verdict) data-card=(format!("card-{i}")) {
             td.needs-script { input type="checkbox" aria-label={ "side by side: " (name(entry)) }; }
             th scope="row" data-sort=(name(entry)) { (link(entry)) }
-            @for cell in cells { td.number[cell.number] data-sort=(cell.sort) { (cell.text) } }
+            @for (cell, head) in cells.iter().zip(&HEADS[1..]) {
+                td.number[cell.number] .verdict[*head == "verdict"] data-sort=(cell.sort) data-label=(head) {
+                    @if *head == "verdict" { i class={ "spot " (found.tone) } {} }
+                    (cell.text)
+                }
+            }
         }
     }
 }
@@ -167,7 +187,8 @@ fn link(entry: &Entry) -> Markup {
     } else {
         format!("{}/report.html", address(&entry.folder))
     };
-    html! { @if entry.has_report { a href=(file) { (name(entry)) } } @else { (name(entry)) } }
+    let parts = words::breaking(name(entry));
+    html! { @if entry.has_report { a href=(file) { (parts) } } @else { (parts) } }
 }
 
 /// A path as an address: what a browser would read as something else is written by its code.
@@ -186,7 +207,7 @@ fn cells(found: &Found) -> Vec<Cell> {
     };
     let mut kinds: Vec<String> = found.effects.iter().take(NAMED).cloned().collect();
     if found.effects.len() > NAMED {
-        kinds.push(format!("{} more", found.effects.len() - NAMED));
+        kinds.push(format!("{}\u{a0}more", found.effects.len() - NAMED));
     }
     let sure = found.sure.map_or(NONE.into(), |sure| format!("{}\u{202f}%", probability_figure(sure)));
     let [(before, before_text), (after, after_text)] = found.gap.clone();
@@ -198,7 +219,10 @@ fn cells(found: &Found) -> Vec<Cell> {
         number(before, before_text),
         number(after, after_text),
         number(found.left, percent(found.left)),
-        number(found.faults.len() as f64, found.faults.len().to_string()),
+        number(
+            found.faults.len() as f64,
+            if found.faults.is_empty() { NONE.into() } else { found.faults.len().to_string() },
+        ),
     ]
 }
 

@@ -17,7 +17,7 @@ pub fn render(gauge: &Gauge) -> Markup {
             @if after { span.swatch.after {} " after (" (gauge.corrected) ")" }
             span.swatch.floor {} " noise floor of the log"
             @if gauge.joints.iter().any(|joint| joint.before.is_some_and(|gap| gap.ci95.is_some())) {
-                span.swatch.whisker {} " 95 % interval"
+                span.swatch.whisker {} " 95 % interval, the small figures"
             }
         }
         div class={ "rows" @if after { " six" } @else { " four" } } role="table" aria-label={ "The " (gauge.what) " gap of each joint" } {
@@ -38,25 +38,30 @@ fn row(gap: &JointGap, gauge: &Gauge, after: bool) -> Markup {
     let bar = |figure: Option<Figure>, class| figure.map(|f| Bar { value: f.value, interval: f.ci95, class });
     let (first, second) = (bar(gap.before, "before"), bar(gap.after, "after"));
     let bars: Vec<Bar> = first.iter().chain(&second).cloned().collect();
-    let print = |bar: &Option<Bar>| {
-        bar.as_ref().map_or(NONE.into(), |b| match with_interval(b.value, b.interval) {
-            (value, Some(ends)) => format!("{} ({ends})", with_unit(&value, unit)),
-            (value, None) => with_unit(&value, unit),
-        })
+    let print = |bar: &Option<Bar>| match bar {
+        Some(bar) => {
+            let (value, ends) = with_interval(bar.value, bar.interval);
+            (with_unit(&value, unit), ends)
+        }
+        None => (NONE.into(), None),
+    };
+    let cell = |bar: &Option<Bar>| {
+        let (value, ends) = print(bar);
+        html! { (value) @if let Some(ends) = ends { " " small { (ends) } } }
     };
     let floor_text = floor.map_or(NONE.into(), |f| with_unit(&significant(f, 2), unit));
     let description = match &second {
-        Some(_) => format!("{joint}: {} before, {} after, noise floor {floor_text}", print(&first), print(&second)),
-        None => format!("{joint}: {}, noise floor {floor_text}", print(&first)),
+        Some(_) => format!("{joint}: {} before, {} after, noise floor {floor_text}", print(&first).0, print(&second).0),
+        None => format!("{joint}: {}, noise floor {floor_text}", print(&first).0),
     };
     let top = top(unit, gauge);
     html! {
         div.row role="row" data-joints=(super::listed(std::slice::from_ref(joint))) {
-            span.name role="rowheader" { (joint) }
+            span.name role="rowheader" { (super::words::breaking(joint)) }
             span.bar role="cell" { (bars::render(&bars, floor, top, &description)) }
-            span.number role="cell" data-label="before" { (print(&first)) }
+            span.number role="cell" data-label="before" { (cell(&first)) }
             @if after {
-                span.number role="cell" data-label="after" { (print(&second)) }
+                span.number role="cell" data-label="after" { (cell(&second)) }
                 span.number role="cell" data-label="times less" { (factor(first.as_ref(), second.as_ref())) }
             }
             span.number role="cell" data-label="floor" { (floor_text) }

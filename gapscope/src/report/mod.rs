@@ -49,8 +49,8 @@ pub use answer::sentences as answer_sentences;
 pub use answer::{changed, headline, is_above_floor, largest};
 pub use axis::Axis;
 pub use format::{
-    NONE, Printed, count, estimate, figure, percent, percent_figure, percent_interval, plain, probability_figure,
-    significant, span, with_unit,
+    NONE, Printed, count, estimate, figure, percent, percent_figure, percent_interval, percent_within, plain,
+    probability_figure, significant, span, with_unit,
 };
 pub use heatmap::picture as heatmap_picture;
 pub use index::{Entry, Found, page as index_page};
@@ -61,8 +61,8 @@ pub use series::picture as series_picture;
 pub use servo::{Beside, answer as servo_answer, html as servo_html};
 pub use setting::Setting;
 pub use words::{
-    capital, effect, effects, implied_unit, in_words, interval, joints as joint_list, list, motion_unit, outstanding,
-    parameter, regime, regime_phrase, rest as words_of_the_rest, said_of, verdict,
+    beside_the_answer, capital, effect, effects, implied_unit, in_words, interval, joints as joint_list, list,
+    motion_unit, outstanding, parameter, regime, regime_phrase, rest as words_of_the_rest, said_of, sentences, verdict,
 };
 
 /// Colours, type and layout; light and dark, wide, narrow and print.
@@ -120,6 +120,7 @@ fn report(gauge: &Gauge, top: &Top, scene: Option<&scene::Scene>, body: &Markup,
     let data = serde_json::to_string(&packet).unwrap_or_default().replace('<', "\\u003c");
     let content = html! {
         (header(gauge, top, scene))
+        (contents(body))
         main { (body) }
         p #filter role="status" hidden { "Showing " b {} " only " button type="button" { "Show all joints" } }
         script type="application/json" id="packet" { (PreEscaped(data)) }
@@ -127,6 +128,38 @@ fn report(gauge: &Gauge, top: &Top, scene: Option<&scene::Scene>, body: &Markup,
         script { (PreEscaped(format!("(() => {{\n{}\n}})();", SCRIPTS.join("\n")))) }
     };
     page(&title, &content, schema)
+}
+
+/// Sections in their order, as the line of links below the answer calls them.
+const CONTENTS: [(&str, &str); 18] = [
+    (OVER_TIME, "Over time"),
+    ("effects", "Effects"),
+    ("drive", "Drives"),
+    ("laws", "Laws"),
+    ("change", "What to change"),
+    ("joints", "By joint"),
+    ("regimes", "Where"),
+    ("shrink", "How far"),
+    ("left", "What is left"),
+    ("bodies", "Bodies"),
+    ("alternatives", "What else"),
+    ("open", "Left open"),
+    ("why", "Why"),
+    ("next", "Next"),
+    ("power", "Could have shown"),
+    ("data", "Data"),
+    ("reproduce", "Reproduce"),
+    ("top", "↑ Top"),
+];
+
+/// A line of links to the sections that the page has; it stays in sight.
+fn contents(body: &Markup) -> Markup {
+    let there = |id: &&(&str, &str)| id.0 == "top" || body.0.contains(&format!("<section id=\"{}\"", id.0));
+    html! {
+        nav.contents aria-label="Sections" {
+            @for (id, name) in CONTENTS.iter().filter(there) { a href={ "#" (id) } { (name) } }
+        }
+    }
 }
 
 /// One self-contained page.
@@ -180,13 +213,15 @@ fn read(diagnosis: &Diagnosis) -> rest::Read<'_> {
 
 fn header(gauge: &Gauge, top: &Top, scene: Option<&scene::Scene>) -> Markup {
     html! {
-        header {
+        header #top {
             div.opening {
                 div {
-                    p.kicker { (top.read.in_short()) @if !top.day.is_empty() { " · " (top.day) } }
-                    h1 class=(tone(top.verdict)) { (words::verdict(top.verdict)) }
+                    p.kicker { (top.read.in_short()) @if !top.day.is_empty() { " · " span.nowrap { (top.day) } } }
+                    // What is wrong with the logs comes before any verdict on them, and no such verdict is green.
                     @for fault in top.faults { p.fault role="alert" { b { "Fault of the data. " } (ticked(&crate::input::fault_line(fault))) } }
-                    @for doubt in top.doubts { p.fault { b { "In doubt. " } (ticked(&doubt.question)) } }
+                    @for doubt in top.doubts { p.fault { b { "In doubt. " } (ticked(&words::capital(&doubt.question))) } }
+                    @let (tone, of) = tone(top);
+                    h1 class=(tone) { (words::verdict(top.verdict)) (of) }
                     div.said { @for line in &top.said { p { (unbroken(line)) } } }
                 }
                 (skeleton::picture(gauge, scene))
@@ -196,10 +231,22 @@ fn header(gauge: &Gauge, top: &Top, scene: Option<&scene::Scene>) -> Markup {
     }
 }
 
-fn tone(verdict: Verdict) -> &'static str {
+/// Class of the verdict, and what it holds for beside the logs as they are.
+fn tone(top: &Top) -> (&'static str, &'static str) {
+    let of = match top {
+        _ if top.faults.iter().any(|fault| fault.mended) => ", of mended logs",
+        _ if !top.faults.is_empty() => ", of faulty logs",
+        _ if !top.doubts.is_empty() => ", with a question open",
+        _ => "",
+    };
+    (tone_of(top.verdict, of.is_empty()), of)
+}
+
+/// Class of a verdict's colour; `sound` logs are those without fault or question.
+fn tone_of(verdict: Verdict, sound: bool) -> &'static str {
     match verdict {
-        Verdict::NoGap | Verdict::Explained => "good",
-        Verdict::PartlyExplained => "partly",
+        Verdict::NoGap | Verdict::Explained if sound => "good",
+        Verdict::NoGap | Verdict::Explained | Verdict::PartlyExplained => "partly",
         Verdict::UnknownEffect | Verdict::NotExcited => "open",
     }
 }
@@ -224,16 +271,23 @@ fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Set
     };
     html! {
         @if evaluated { (section(OVER_TIME, "Torque over time", "", &series::render(gauge))) }
+        @let lead = match diagnosis.effects.len() {
+            0 => "",
+            _ => "What the robot does that the model does not, strongest first. Of the effects reported with a confidence of 90 %, nine in ten are there.",
+        };
+        (section("effects", "Effects", lead,
+            &effects::render(&plain::together(diagnosis), &diagnosis.joints, "alone, torque gap shrinks by", words::nothing_found(diagnosis.verdict))))
+        @if evaluated && !diagnosis.effects.is_empty() { (laws(diagnosis, evidence)) }
         @if let Some(paste) = paste::render(diagnosis, setting, &robot) {
             (section("change", "What to change", "", &paste))
         }
-        (section("effects", "Effects", "What the robot does that the model does not, strongest first. Of the effects reported with a confidence of 90 %, nine in ten are there.",
-            &effects::render(&plain::together(diagnosis), &diagnosis.joints, "alone, torque gap shrinks by", words::nothing_found(diagnosis.verdict))))
         @if evaluated { (figures(gauge, diagnosis, evidence)) }
         @if let Some(bodies) = rest::bodies(diagnosis) {
             (section("bodies", "What the logs tell of bodies", "Sums over all that a joint carries, where those of single links are not told: differences from the robot description, surest first.", &bodies))
         }
-        (section("alternatives", "What else it could be", "Other sets of effects that these logs do not exclude.", &rest::alternatives(diagnosis)))
+        @if evaluated && diagnosis.verdict != Verdict::NoGap {
+            (section("alternatives", "What else it could be", "Other sets of effects that these logs do not exclude.", &rest::alternatives(diagnosis)))
+        }
         @if let Some(why) = why::render(&diagnosis.why, &diagnosis.joints) {
             (section("why", "Why it is so", "What was proposed, against what, and by how much the logs spoke for it.", &why))
         }
@@ -258,24 +312,24 @@ fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Set
     }
 }
 
+fn laws(diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
+    html! {
+        (section("laws", "The law of each effect", "Each dot is what the data ask of this effect; the band is its 95 % interval. Laws of several parameters have no band: the table above has their intervals.",
+            &curves::render(&curves::of(evidence, &diagnosis.effects), &diagnosis.joints, "No curves were kept for this report.")))
+    }
+}
+
 /// The sections that rest on an evaluation: left out where the logs allowed none.
 fn figures(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence) -> Markup {
     let quiet = |joint: &str| !is_above_floor(diagnosis, joint);
     let [place, _, how_far] = answer::sentences(diagnosis, evidence);
-    let no_law = if diagnosis.effects.is_empty() {
-        "No effect was found, so there is no law to draw."
-    } else {
-        "No curves were kept for this report."
-    };
     html! {
-        (section("laws", "The law of each effect", "The band is the interval of the parameter, where the law is in proportion to one. Of all others the table above has the intervals.",
-            &curves::render(&curves::of(evidence, &diagnosis.effects), &diagnosis.joints, no_law)))
         (section("joints", "Torque gap by joint", "Measured torque less what the model needs for the same motion, rms on held-out data.",
             &joints::render(gauge)))
-        (section("regimes", "Where the gap lies", "Share of each regime in its joint’s squared torque gap, for the model as described, on held-out data.",
+        (section("regimes", "Where the gap lies", "In which regimes of the motion the model as described is off, on held-out data.",
             &html! {
                 p.point { (unbroken(&place)) }
-                (heatmap::render(&diagnosis.joints, &diagnosis.gap.regimes, "Gap by joint and regime", "the joint’s squared torque gap", &quiet))
+                (heatmap::render(&diagnosis.joints, &diagnosis.gap.regimes, "Gap by joint and regime", "the joint’s squared torque gap", &quiet, true))
             }))
         (section("shrink", "How far it shrinks", "", &html! {
             p.point { (unbroken(&how_far)) }

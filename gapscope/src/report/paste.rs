@@ -3,7 +3,7 @@
 use super::setting::Setting;
 use super::words;
 use gapscope_diagnosis::schema::Diagnosis;
-use gapscope_export::TargetLedger;
+use gapscope_export::{How, TargetLedger};
 use maud::{Markup, html};
 
 /// The boxes and the tables below them; `None` where no effect was found.
@@ -22,8 +22,7 @@ pub fn render(diagnosis: &Diagnosis, setting: &Setting, robot: &str) -> Option<M
     Some(html! {
         @if pasted {
             p { "Numbers are totals: what the file had is included. Units are those of the joint: N m s/rad and N m, N s/m and N where it slides." }
-            (one(own))
-            @for other in others { (one(other)) }
+            div.grid-two.top { (one(own)) @for other in others { (one(other)) } }
             p { "Or all of it at once, where FOLDER is the one that holds this report:" }
         } @else {
             p { "Nothing here is a number of one joint. The whole corrected file, where FOLDER is the one that holds this report:" }
@@ -51,10 +50,17 @@ fn one(ledger: &TargetLedger) -> Markup {
         false => format!("{text}  <!-- {joint} -->"),
     };
     let text: Vec<String> = lines.iter().map(line).collect();
+    let lacking: Vec<String> =
+        ledger.effects.iter().filter(|entry| entry.how == How::LeftOut).map(|entry| entry.kind.clone()).collect();
     html! {
         @if !text.is_empty() {
-            h3 { @if mjcf { "Attributes for the joints of an MJCF" } @else { "Elements for the joints of a URDF" } }
-            (super::reproduce::boxed(&format!("paste-{}", ledger.target), &text.join("\n")))
+            div {
+                h3 { @if mjcf { "Attributes for the joints of an MJCF" } @else { "Elements for the joints of a URDF" } }
+                (super::reproduce::boxed(&format!("paste-{}", ledger.target), &text.join("\n")))
+                @if !lacking.is_empty() {
+                    p.note { (words::capital(format_of(ledger))) " has nothing for " (words::list(&words::effects(&lacking), "and")) "." }
+                }
+            }
         }
     }
 }

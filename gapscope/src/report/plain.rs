@@ -36,11 +36,13 @@ pub fn effects(list: &[FoundEffect], all: &[String], sums: &[Combination]) -> St
     // A place that is the first one's need not be said again.
     let named = |e: &FoundEffect| match words::joints_in_a_sentence(&e.joints, all) {
         _ if e.joints.is_empty() || e.joints == first.joints => words::effect(&e.kind),
-        place => format!("{} at {place}", words::effect(&e.kind)),
+        place => format!("{} ({place})", words::effect(&e.kind)),
     };
-    let mut named: Vec<String> = rest.iter().take(FURTHER).map(named).collect();
-    if rest.len() > FURTHER {
-        named.push(count(rest.len() - FURTHER, "weaker effect"));
+    // A number that stands for one effect says less than its name.
+    let shown = if rest.len() == FURTHER + 1 { FURTHER + 1 } else { FURTHER };
+    let mut named: Vec<String> = rest.iter().take(shown).map(named).collect();
+    if rest.len() > shown {
+        named.push(count(rest.len() - shown, "weaker effect"));
     }
     let also = if named.is_empty() { String::new() } else { format!(" Beside it: {}.", words::list(&named, "and")) };
     format!("{}.{also}", clause::of(first, all, sums))
@@ -144,14 +146,23 @@ fn faults(faults: &[Fault]) -> String {
 
 /// The strongest effect that the logs cannot tell from another, in words; `None` where there is none.
 pub fn tie(diagnosis: &Diagnosis) -> Option<String> {
-    let next = if diagnosis.next_experiment.is_some() { " The next experiment would." } else { "" };
+    // Where no motion tells them apart, there is a word of advice and no trajectory.
+    let told = diagnosis.next_experiment.as_ref().is_some_and(|next| next.trajectory.is_some());
+    let next = if told { " The next experiment would." } else { "" };
     Some(first_tie(&diagnosis.effects)? + next)
 }
+
+/// Rivals that a sentence names.
+const RIVALS: usize = 3;
 
 /// The same without a word of the next experiment.
 pub fn first_tie(effects: &[FoundEffect]) -> Option<String> {
     let tied = effects.iter().find(|effect| !effect.indistinguishable_from.is_empty())?;
-    let others = words::effects(&tied.indistinguishable_from);
+    let mut others = words::effects(&tied.indistinguishable_from);
+    if others.len() > RIVALS + 1 {
+        let more = others.split_off(RIVALS).len();
+        others.push(format!("{more} others"));
+    }
     let name = words::effect(&tied.kind);
     Some(format!("These logs cannot tell {name} from {}.", words::list(&others, "or")))
 }

@@ -1,6 +1,6 @@
 //! What the logs could have revealed: the least size of each effect, joint by joint.
 
-use super::format::{NONE, range, significant, with_unit};
+use super::format::{NONE, significant, with_unit};
 use super::words;
 use gapscope_diagnosis::schema::{Diagnosis, Power};
 use maud::{Markup, html};
@@ -66,11 +66,15 @@ pub fn line(power: &[Power]) -> Option<String> {
             let least = sizes.iter().map(size).fold(f64::INFINITY, f64::min);
             let most = sizes.iter().map(size).fold(0.0, f64::max);
             let [from, to] = [least, most].map(|x| significant(x, 2));
-            let span = if from == to { from } else { range(&from, &to) };
-            Some(format!("{} from {}", words::effect(kind), with_unit(&span, &sizes.first()?.unit)))
+            let (name, unit) = (words::effect(kind), &sizes.first()?.unit);
+            Some(if from == to {
+                format!("{name} from {}", with_unit(&from, unit))
+            } else {
+                format!("{name} from {from} to {}, by joint,", with_unit(&to, unit))
+            })
         })
         .collect();
-    (!told.is_empty()).then(|| format!("{} would have been seen", words::list(&told, "and")))
+    (!told.is_empty()).then(|| format!("{} would have been seen", words::list(&told, "and").replace(",,", ",")))
 }
 
 /// Entries that share kind, parameter and unit, in the order in which they come.

@@ -1,11 +1,12 @@
 //! What follows the figures: what is left, alternatives, the next experiment, the data, and how to check it all.
 
-use super::effects::meter;
 use super::format::{NONE, count, figure, group, percent, plain, with_interval, with_unit};
 use super::{heatmap, words};
 use gapscope_diagnosis::schema::{Combination, Diagnosis, Evidence, Gap, Verdict};
 use maud::{Markup, html};
 
+/// Less than this part of the squared gap is a trace: its map folds away.
+const TRACE: f64 = 0.005;
 /// Findings that are listed at once; the rest folds away.
 const LISTED: usize = 12;
 
@@ -18,7 +19,11 @@ pub fn unexplained(diagnosis: &Diagnosis) -> Markup {
         } @else {
             p { (sentence(diagnosis)) }
             @if left.fraction > 0.0 && !left.regimes.is_empty() {
-                (heatmap::render(&diagnosis.joints, &left.regimes, "What is left, by joint and regime", "the square of what is left at the joint", &|joint: &str| !super::is_above_floor(diagnosis, joint)))
+                @let map = heatmap::render(&diagnosis.joints, &left.regimes, "What is left, by joint and regime", "the square of what is left at the joint", &|joint: &str| !super::is_above_floor(diagnosis, joint), false);
+                // Shares of next to nothing are no place to look at.
+                @if left.fraction < TRACE {
+                    details { summary { "Where this trace lies, by joint and regime" } (map) }
+                } @else { (map) }
             }
         }
     }
@@ -76,13 +81,13 @@ pub fn alternatives(diagnosis: &Diagnosis) -> Markup {
     }
     html! {
         table.plain {
-            thead { tr { th scope="col" { "instead" } th scope="col" { "probability" } } }
+            thead { tr { th scope="col" { "instead of all effects above" } th scope="col" { "fits these logs" } } }
             tbody {
                 @for alternative in &diagnosis.alternatives {
                     @let names: Vec<String> = alternative.effects.iter().map(|kind| words::effect(kind)).collect();
                     tr {
                         td { @if names.is_empty() { "no effect at all" } @else { (words::capital(&names.join(" + "))) } }
-                        td.nowrap { (meter(alternative.probability)) " " (percent(alternative.probability)) }
+                        td { (words::beside_the_answer(alternative.probability)) }
                     }
                 }
             }
@@ -99,18 +104,18 @@ pub fn next_experiment(diagnosis: &Diagnosis, playable: bool) -> Markup {
         };
         return html! { p { (text) } };
     };
-    let kinds: Vec<String> = next.separates.iter().map(|kind| words::effect(kind)).collect();
     html! {
         div.callout {
-            p { b { (super::ticked(&words::in_words(&next.motion))) } }
-            p { (super::ticked(&words::in_words(&next.why))) }
+            @let told = words::sentences(&words::in_words(&next.motion));
+            @let (act, gain) = told.split_once(". ").unwrap_or((&told, ""));
+            p { b { (super::ticked(act.trim_end_matches('.'))) "." } }
+            p { (super::ticked(&words::sentences(&words::in_words(&next.why)))) @if !gain.is_empty() { " " (super::ticked(gain)) } }
             @if let Some(file) = &next.trajectory {
                 p { code { (file) } " beside this report holds time, position, velocity and acceleration of every joint, from rest to rest, within the URDF’s limits. Diagnose its log together with these." }
             }
             @if playable {
                 p.tools.needs-script { button type="button" data-play=(super::scene::NEXT) { "Play it on the robot above" } }
             }
-            @if !kinds.is_empty() { p.muted { "Tells apart: " (words::list(&kinds, "and")) "." } }
         }
     }
 }

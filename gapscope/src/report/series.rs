@@ -18,9 +18,6 @@ const STRETCHES: usize = 240;
 /// The same of the lines that the script draws.
 const STRETCHES_ALL: usize = 2400;
 const STRETCHES_ONE: usize = 500;
-/// Joints whose pictures stand open; of more only the one that is shown in full.
-const OPEN: usize = 1;
-
 /// Episodes whose ends a picture shows; of more the lines run on, as one pixel holds several.
 const EPISODES: usize = 60;
 
@@ -143,17 +140,16 @@ pub fn render(gauge: &Gauge) -> Markup {
             div.chart tabindex="0" role="application"
                 aria-label={ (words::capital(gauge.what)) " over time of the joint chosen. Arrow keys read it, plus and minus zoom, shift with arrows moves, 0 shows all." } {}
             output aria-live="polite" {}
-            p.note { "Below: measured less each model. Drag over a stretch to zoom, double-click to see all. Episodes one after another, fits on held-out data, thinned so that peaks stay." }
+            p.note { "Lower chart: measured less each model. Drag over a stretch to zoom, double-click to see all. Episodes stand one after another; models are fitted on other parts of the logs; peaks stay." }
         }
         div data-still="" { (one(shown)) }
-        details.all-joints open[drawn.len() <= OPEN] {
-            summary {
-                @if drawn.len() > 1 { "All " (count(drawn.len(), "joint")) ", with the error that is left" } @else { "With the error that is left" }
-            }
-            div.grid-two {
-                @for series in drawn {
-                    div data-joints=(super::listed(std::slice::from_ref(&series.joint))) {
-                        (one(series))
+        // The picture of a single joint stands already.
+        @if drawn.len() > 1 {
+            details.all-joints {
+                summary { "All " (count(drawn.len(), "joint")) ", with the gap that is left" }
+                div.grid-two {
+                    @for series in drawn {
+                        div data-joints=(super::listed(std::slice::from_ref(&series.joint))) { (one(series)) }
                     }
                 }
             }

@@ -1,9 +1,10 @@
 //! The report of a servo arm: the same page as of a robot whose logs hold torque, of position under the set points.
 
 mod answer;
+mod change;
 pub mod schema;
 
-use super::format::{self, percent, percent_interval, with_unit};
+use super::format::{self, percent, percent_interval, percent_within, with_unit};
 use super::gauge::{Figure, Gauge, JointGap};
 use super::scene::Scene;
 use super::{Top, curves, effects, heatmap, joints, reproduce, rest, section, series, setting, why, words};
@@ -17,7 +18,7 @@ use gapscope_servo::{Evidence, Outcome, Signal};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
-pub use answer::{answer, nominal};
+pub use answer::{angle, answer, nominal};
 
 /// Part of a joint's samples whose speed a curve shows: the fastest are noise of the encoder.
 const USUAL: f64 = 0.99;
@@ -140,21 +141,28 @@ pub fn html(outcome: &Outcome, beside: &Beside, corrected: &str) -> String {
         said: answer(diagnosis).into(),
         day: &beside.day,
     };
-    let body = body(&gauge, diagnosis, evidence, beside, corrected, &top);
+    let change = change::render(diagnosis, &outcome.corrected);
+    let body = body(&gauge, diagnosis, evidence, beside, corrected, &top, change);
     super::report(&gauge, &top, beside.scene.as_ref(), &body, &diagnosis.schema)
 }
 
 fn gauge(diagnosis: &Diagnosis, evidence: &Evidence, beside: &Beside) -> Gauge {
-    let thousandths = |map: &BTreeMap<String, f64>, joint: &str| map.get(joint).map(|rms| 1e3 * rms);
-    let figure =
-        |map: &BTreeMap<String, f64>, joint: &str| thousandths(map, joint).map(|value| Figure { value, ci95: None });
     let gap = &diagnosis.gap.position;
+    // Thousandths, unless a joint is off by a whole unit.
+    let scale = if gap.rms.values().all(|rms| *rms < 0.9995) { 1e3 } else { 1.0 };
+    let scaled = |map: &BTreeMap<String, f64>, joint: &str| map.get(joint).map(|rms| scale * rms);
+    let figure =
+        |map: &BTreeMap<String, f64>, joint: &str| scaled(map, joint).map(|value| Figure { value, ci95: None });
+    let unit = |joint: &str| {
+        let small = beside.units.get(joint).copied().unwrap_or("mrad");
+        if scale > 1.0 { small } else { &small[1..] }.to_owned()
+    };
     let joint = |name: &String| JointGap {
         name: name.clone(),
-        unit: beside.units.get(name).copied().unwrap_or("mrad").to_owned(),
+        unit: unit(name),
         before: figure(&gap.rms, name),
         after: figure(&evidence.remaining, name),
-        floor: thousandths(&gap.floor, name),
+        floor: scaled(&gap.floor, name),
     };
     Gauge {
         what: "position",
@@ -173,6 +181,7 @@ fn body(
     beside: &Beside,
     corrected: &str,
     top: &Top,
+    change: Option<Markup>,
 ) -> Markup {
     let found = schema::effects(&diagnosis.effects);
     let all = &diagnosis.joints;
@@ -194,12 +203,13 @@ fn body(
             (section("laws", "The law of each effect", "Friction over speed. No data lie behind the curves, as nothing measured the torque; what is no friction has its interval in the table above.",
                 &curves::render(&curves, all, "None of the effects found is friction over speed.")))
         }
+        @if let Some(change) = change { (section("change", "What to change", "", &change)) }
         (section("joints", "Position gap by joint", &weighted(diagnosis), &joints::render(gauge)))
         (section("regimes", "Where the gap lies", &format!("Share of each regime in its joint’s squared position gap, for {}.", gauge.nominal),
-            &heatmap::render(all, &regimes, "Gap by joint and regime", "the joint’s squared position gap", &quiet)))
+            &heatmap::render(all, &regimes, "Gap by joint and regime", "the joint’s squared position gap", &quiet, true)))
         (section("left", "What is left unexplained", "", &html! {
             p { (unexplained(diagnosis)) }
-            (heatmap::render(all, &left, "What is left, by joint and regime", "the square of what is left at the joint", &quiet))
+            (heatmap::render(all, &left, "What is left, by joint and regime", "the square of what is left at the joint", &quiet, false))
         }))
         (section("open", "What these logs leave open", "", &open(diagnosis)))
         @if let Some(why) = why::render(&schema::why(&diagnosis.why), all) {
@@ -230,9 +240,9 @@ fn weighted(diagnosis: &Diagnosis) -> String {
     let moves = if shrink < 0.0 { "grows" } else { "shrinks" };
     format!(
         "{lead} Over all joints, each by how far it is told to move, it {moves} from {} to {}, by {}{interval}.",
-        format::figure(1e3 * before),
-        with_unit(&format::figure(1e3 * after), "mrad"),
-        percent(shrink.abs())
+        angle(before, after),
+        angle(after, before),
+        percent_within(shrink.abs(), change.ci95)
     )
 }
 

@@ -3,7 +3,7 @@
 use super::axis::{Axis, extent};
 use super::bars::{self, Bar};
 use super::chart::{Plot, band, dots, line};
-use super::format::{NONE, figure, percent, percent_interval, plain};
+use super::format::{figure, percent_interval, percent_within, plain};
 use super::words;
 use gapscope_diagnosis::schema::{Change, Diagnosis, HorizonChange, Regime, Shrink};
 use maud::{Markup, html};
@@ -30,8 +30,10 @@ fn table(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Markup {
                 td.number { (figure(change.gaps()[0])) }
                 @if corrected {
                     td.number { (figure(change.gaps()[1])) }
-                    td.number { b { (change.shrink.map_or("at the floor".into(), percent)) } }
-                    td.number { (change.ci95.map_or(NONE.into(), percent_interval)) }
+                    td.number {
+                        b { (change.shrink.map_or("at the floor".into(), |part| percent_within(part, change.ci95))) }
+                        @if let Some(ends) = change.ci95 { " " small { (percent_interval(ends)) } }
+                    }
                 }
             }
         }
@@ -45,8 +47,7 @@ fn table(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Markup {
                     th.number scope="col" { "before" }
                     @if corrected {
                         th.number scope="col" { "after" }
-                        th.number scope="col" { "shrinks by" }
-                        th.number scope="col" { "95 %" }
+                        th.number scope="col" { "shrinks by, 95 %" }
                     }
                 }
             }

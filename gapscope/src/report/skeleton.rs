@@ -48,7 +48,7 @@ pub fn picture(gauge: &Gauge, scene: Option<&Scene>) -> Markup {
     let floor: Vec<String> = (0..=FLOOR)
         .map(|k| {
             let angle = std::f64::consts::TAU * k as f64 / FLOOR as f64;
-            let [x, y] = point(FLOOR_RADIUS * view.radius * DVec3::new(angle.cos(), angle.sin(), 0.0));
+            let [x, y] = point(FLOOR_RADIUS * view.wide * DVec3::new(angle.cos(), angle.sin(), 0.0));
             format!("{},{}", short3(x), short3(y))
         })
         .collect();
@@ -82,16 +82,33 @@ pub fn picture(gauge: &Gauge, scene: Option<&Scene>) -> Markup {
                 }
             }
             figcaption {
-                span.muted.needs-script { "Drag or arrow keys turn it; a joint filters the page." }
+                (key(gauge))
                 span.tools.needs-script {
                     button type="button" data-play="log" { "Play the log" }
                     @for play in &scene.plays { button type="button" data-play=(play.name) { (play.label) } }
                 }
+                span.note.needs-script { "Drag to turn it, or use arrow keys. A joint filters the page." }
                 span.rollout-key.legend hidden[true] {
-                    span.swatch.measured {} " robot " span.swatch.before {} " " (gauge.nominal) " "
-                    @if gauge.has_after() { span.swatch.after {} " " (gauge.corrected) }
+                    span.pace {}
+                    span { i.swatch.measured {} " robot" }
+                    span { i.swatch.before {} " " (gauge.nominal) }
+                    @if gauge.has_after() { span { i.swatch.after {} " " (gauge.corrected) } }
                 }
             }
+        }
+    }
+}
+
+/// What the colours say; nothing where no gap was evaluated.
+fn key(gauge: &Gauge) -> Markup {
+    let Some(largest) = gauge.largest().filter(|joint| gauge.boldness(joint).is_some()) else { return html! {} };
+    let quiet = gauge.joints.iter().any(|joint| joint.before.is_some() && gauge.boldness(joint).is_none());
+    let most = largest.before.map_or(String::new(), |gap| with_unit(&significant(gap.value, 3), &largest.unit));
+    html! {
+        span.legend.tones {
+            (super::words::capital(gauge.what)) " gap, rms"
+            @if quiet { span { i.dot.quiet {} " at the noise" } }
+            @if gauge.joints.len() > 1 { span { i.tone-ramp {} " to " (most) } } @else { span { i.dot.gap style="--g:100%" {} " " (most) } }
         }
     }
 }
@@ -135,27 +152,46 @@ pub fn list(gauge: &Gauge) -> Markup {
     }
 }
 
-/// A place and a scale that hold the robot in all frames.
+/// A place and a scale that hold the robot in all frames, from wherever it is looked at around the vertical.
 struct View {
+    /// In the plane of the floor.
     center: DVec3,
-    radius: f64,
+    /// How far the robot reaches from there.
+    wide: f64,
+    /// Half the picture, and where its middle lies above the center.
+    half: f64,
+    rise: f64,
 }
+
+/// Free space around the robot, as a part of it; numbers stand there.
+const MARGIN: f64 = 0.1;
 
 impl View {
     fn of(scene: &Scene) -> View {
         let all = || scene.robot_frames().flatten().copied().chain([DVec3::ZERO]);
         let (low, high) = all().fold((DVec3::ZERO, DVec3::ZERO), |(a, b), p| (a.min(p), b.max(p)));
-        let center = 0.5 * (low + high);
-        let radius = all().map(|p| (p - center).length()).fold(0.0, f64::max);
-        View { center, radius: if radius > 0.0 { radius } else { 1.0 } }
+        let center = 0.5 * (low + high) * DVec3::new(1.0, 1.0, 0.0);
+        // The script does the same in `fit`.
+        let (sin, cos) = VIEW[1].sin_cos();
+        let (mut wide, mut down, mut up) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for p in all() {
+            let away = (p - center).truncate().length();
+            wide = wide.max(away);
+            down = down.min(p.z * cos - away * sin);
+            up = up.max(p.z * cos + away * sin);
+        }
+        // The circle on the floor stands around the base.
+        down = down.min(-sin * (FLOOR_RADIUS * wide + center.length()));
+        let half = (1.0 + MARGIN) * wide.max(0.5 * (up - down));
+        View { center, wide, half: if half > 0.0 { half } else { 1.0 }, rise: 0.5 * (up + down) }
     }
 
     /// The script does the same in `project`.
     fn project(&self, p: DVec3) -> [f64; 2] {
-        let p = (p - self.center) / self.radius;
+        let p = p - self.center;
         let [yaw, pitch] = VIEW;
         let (x, away) = (p.x * yaw.cos() - p.y * yaw.sin(), p.x * yaw.sin() + p.y * yaw.cos());
-        [x, -(p.z * pitch.cos() + away * pitch.sin())]
+        [x / self.half, (self.rise - p.z * pitch.cos() - away * pitch.sin()) / self.half]
     }
 }
 

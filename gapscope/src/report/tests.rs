@@ -1,7 +1,6 @@
 //! The page as a whole: well formed, escaped, finite, small, and the same every time.
 
 #[path = "../../tests/all/browser.rs"]
-#[allow(clippy::print_stdout)]
 pub mod browser;
 
 use super::*;
@@ -10,7 +9,7 @@ use gapscope_diagnosis::schema::Parameter;
 use gapscope_effects::Kind;
 
 /// Elements that HTML closes by itself.
-const VOID: [&str; 4] = ["meta", "input", "br", "link"];
+const VOID: [&str; 5] = ["meta", "input", "br", "link", "wbr"];
 
 /// The page without what stands inside its scripts.
 fn without_scripts(page: &str) -> String {
@@ -219,6 +218,9 @@ fn thirty_joints_with_long_names_and_a_thousand_episodes_have_a_page_that_works(
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("report.html");
     std::fs::write(&file, &page).unwrap();
+    if let Ok(folder) = std::env::var("GAPSCOPE_SAMPLE_REPORTS") {
+        std::fs::write(std::path::Path::new(&folder).join("large.html"), &page).ok();
+    }
     look(&[&file], &[]);
 }
 

@@ -3,6 +3,7 @@
 use super::format::{self, percent, plain, with_unit};
 use gapscope_diagnosis::schema::{Bounds, Evidence, Regime, Unexplained, Verdict};
 use gapscope_effects::Kind;
+use maud::{Markup, html};
 
 /// An effect's public name in words, lower case but for names of people.
 pub fn effect(kind: &str) -> String {
@@ -29,6 +30,24 @@ pub fn in_words(text: &str) -> String {
         if known { effect(name) + &word[name.len()..] } else { word.to_owned() }
     };
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// A text of sentences, each with a capital letter and a stop.
+pub fn sentences(text: &str) -> String {
+    let list: Vec<String> = text.trim_end_matches('.').split(". ").map(capital).collect();
+    list.join(". ") + "."
+}
+
+/// From this probability on another account is at least as likely as the answer.
+const EVEN: f64 = 0.5;
+
+/// How well another account fits beside the answer, of which the probability knows these two alone.
+pub fn beside_the_answer(probability: f64) -> String {
+    if probability >= EVEN {
+        "at least as well as the answer".into()
+    } else {
+        format!("less well: {} against the answer", percent(probability))
+    }
 }
 
 /// What the real robot does that the model does not, in one clause; empty for kinds outside the catalogue.
@@ -272,6 +291,17 @@ pub fn list(items: &[String], last: &str) -> String {
         [rest @ .., end] => format!("{} {last} {end}", rest.join(", ")),
     }
 }
+
+/// A name that may break between its parts, where it is long.
+pub fn breaking(name: &str) -> Markup {
+    html! {
+        @if name.chars().count() <= LONG { (name) }
+        @else { @for part in name.split_inclusive(['_', '/', '-', '.']) { (part) wbr; } }
+    }
+}
+
+/// Characters of a name that fits a column.
+const LONG: usize = 16;
 
 /// First letter upper case.
 pub fn capital(text: &str) -> String {

@@ -1,9 +1,10 @@
 //! The diagnosis and the evaluation of a servo arm as a few lines for the terminal, in the order of those of torque.
 
-use crate::report::servo::{answer as three, follows, nominal, schema};
+use crate::report::servo::{angle, answer as three, follows, nominal, schema};
 use crate::report::terminal::{INDENT, Paint, block, clean, column, name, pad, wrap};
 use crate::report::{
-    Beside, count, figure, joint_list, parameter, percent, percent_interval, plain as rounded, verdict, with_unit,
+    Beside, count, joint_list, parameter, percent, percent_interval, percent_within, plain as rounded, verdict,
+    with_unit,
 };
 use crate::summary::{faults, ordinary_spaces, regime_rows, rest, ties, told, which};
 use gapscope_diagnosis::schema::Verdict;
@@ -25,7 +26,7 @@ pub fn sentences(diagnosis: &Diagnosis) -> [String; 3] {
     let words = |row: &String| row.split_whitespace().collect::<Vec<_>>().join(" ");
     let which = rows.iter().map(words).collect::<Vec<_>>().join("; ");
     let worst = place(diagnosis).unwrap_or_else(|| "no joint moves".to_owned());
-    [format!("{}. Effects: {which}", headline(diagnosis)), worst, reach(diagnosis)]
+    [format!("{} Effects: {which}", headline(diagnosis)), worst, reach(diagnosis)]
 }
 
 /// The diagnosis in some lines: faults, the answer, ties, which, the drives, where, how far, notes, and where the report is.
@@ -65,15 +66,8 @@ pub fn summary(diagnosis: &Diagnosis, beside: &Beside, out: Option<&Path>, paint
 }
 
 /// What was proposed, and by how much the logs spoke for or against it.
-pub fn why(diagnosis: &Diagnosis) -> String {
-    let mut lines =
-        vec![String::new(), "Why      what was proposed, and by how many nats it won (+) or lost (-)".to_owned()];
-    for why in &diagnosis.why {
-        let word = if why.taken { "taken" } else { "no" };
-        let place = why.joints.join(", ");
-        lines.push(format!("  {word:5}  {:+9.1}  {} at {place}, against {}", why.odds, why.proposed, why.against));
-    }
-    ordinary_spaces(&lines.iter().map(|line| clean(line)).collect::<Vec<_>>())
+pub fn why(diagnosis: &Diagnosis, paint: &Paint) -> String {
+    crate::summary::why(&schema::why(&diagnosis.why), &diagnosis.joints, paint)
 }
 
 /// The evaluation in a few lines: the gap over all logs, by joint and by log.
@@ -85,12 +79,12 @@ pub fn evaluation_summary(evaluation: &Evaluation) -> String {
         far.push(format!("free run under the set points: {}", change(&shrink.position)));
     }
     if let Some(mean) = evaluation.mean_absolute {
-        far.push(format!("mean absolute error {}", mrad(mean)));
+        far.push(format!("mean absolute error {}", angle(mean, mean)));
     }
     block(&mut lines, paint, "How far", &far);
     let joint = |(joint, rms): (&String, &f64)| {
-        let after = evaluation.after.get(joint).map_or(String::new(), |after| format!(" → {}", mrad(*after)));
-        clean(&format!("{joint}  {} rms{after}", mrad(*rms)))
+        let after = evaluation.after.get(joint).map_or(String::new(), |after| format!(" → {}", angle(*after, *rms)));
+        clean(&format!("{joint}  {} rms{after}", angle(*rms, *rms)))
     };
     block(&mut lines, paint, "Where", &evaluation.gap.position.rms.iter().map(joint).collect::<Vec<_>>());
     let width = column(evaluation.logs.iter().map(|log| log.log.as_str()), 44);
@@ -104,7 +98,8 @@ fn effects(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
     if diagnosis.effects.is_empty() {
         return vec!["no effect is claimed".into()];
     }
-    which::rows(&schema::effects(&diagnosis.effects), &diagnosis.joints, "with it", &|_| None, paint)
+    let with = ["with it the gap shrinks by", "with it the gap grows by"];
+    which::rows(&schema::effects(&diagnosis.effects), &diagnosis.joints, with, &|_| None, paint)
 }
 
 /// Each joint with what it follows, its constants, and what the logs leave open.
@@ -145,7 +140,7 @@ fn constants(drive: &FoundDrive) -> String {
 fn place(diagnosis: &Diagnosis) -> Option<String> {
     let gaps = diagnosis.gap.position.rms.iter().filter(|(_, rms)| rms.is_finite());
     let (joint, rms) = gaps.max_by(|a, b| a.1.total_cmp(b.1))?;
-    Some(clean(&format!("largest at {joint}: {} rms from {}", mrad(*rms), nominal(diagnosis))))
+    Some(clean(&format!("largest at {joint}: {} rms from {}", angle(*rms, *rms), nominal(diagnosis))))
 }
 
 fn reach(diagnosis: &Diagnosis) -> String {
@@ -155,11 +150,11 @@ fn reach(diagnosis: &Diagnosis) -> String {
 fn headline(diagnosis: &Diagnosis) -> String {
     let left = format!("{} of the squared gap is left", percent(diagnosis.unexplained.fraction.max(0.0)));
     match schema::verdict(&diagnosis.verdict) {
-        Verdict::NotExcited => "no joint moves or is told to".to_owned(),
-        Verdict::NoGap => format!("the drives alone explain the logs; {left}"),
-        Verdict::UnknownEffect => format!("something is there that no effect of the catalogue explains; {left}"),
-        Verdict::PartlyExplained => format!("the drives and these effects explain a part of the logs; {left}"),
-        Verdict::Explained => format!("effects on top of the drives explain the logs; {left}"),
+        Verdict::NotExcited => "No joint moves or is told to.".to_owned(),
+        Verdict::NoGap => format!("The drives alone explain the logs; {left}."),
+        Verdict::UnknownEffect => format!("Something is there that no effect of the catalogue explains; {left}."),
+        Verdict::PartlyExplained => format!("The drives and these effects explain a part of the logs; {left}."),
+        Verdict::Explained => format!("Effects on top of the drives explain the logs; {left}."),
     }
 }
 
@@ -167,20 +162,18 @@ fn change(change: &Change) -> String {
     match (change.before, change.after) {
         (Some(before), Some(after)) => {
             let sign = |shrink: f64| if shrink < 0.0 { "+" } else { "−" };
-            let shrink =
-                change.shrink.map_or("at the floor".to_owned(), |s| format!("{}{}", sign(s), percent(s.abs())));
+            let shrink = change
+                .shrink
+                .map_or("at the floor".to_owned(), |s| format!("{}{}", sign(s), percent_within(s.abs(), change.ci95)));
             // Ends of one sign share it.
             let ends = change.ci95.filter(|[low, high]| low * high > 0.0).map(|ends| {
                 let [a, b] = ends.map(f64::abs);
                 format!(" ({})", percent_interval([a.min(b), a.max(b)]))
             });
-            format!("{} → {}  {shrink}{}", mrad(before), mrad(after), ends.unwrap_or_default())
+            let [from, to] = [angle(before, after), angle(after, before)];
+            format!("{from} → {to}  {shrink}{}", ends.unwrap_or_default())
         }
-        (Some(before), None) => format!("{} → the arm found here cannot be simulated there", mrad(before)),
+        (Some(before), None) => format!("{} → the arm found here cannot be simulated there", angle(before, before)),
         _ => "cannot be simulated".to_owned(),
     }
-}
-
-fn mrad(value: f64) -> String {
-    with_unit(&figure(1e3 * value), "mrad")
 }

@@ -1,12 +1,12 @@
 //! A gap before and after, as columns of text.
 
 use crate::report::terminal::{fill, pad};
-use crate::report::{percent, percent_interval};
+use crate::report::{percent_interval, percent_within};
 use gapscope_diagnosis::schema::Change;
 
-/// What a gap loses as a signed percentage: `−93 %`.
-fn change_sign(shrink: f64) -> String {
-    let text = percent(shrink.abs());
+/// What a gap loses as a signed percentage: `−93 %`, to the digits of its interval.
+fn change_sign(shrink: f64, interval: Option<[f64; 2]>) -> String {
+    let text = percent_within(shrink.abs(), interval);
     match text.trim_start_matches(['<', '>']) {
         _ if text.starts_with('<') || shrink == 0.0 => "±0 %".into(),
         text if shrink < 0.0 => format!("+{text}"),
@@ -17,7 +17,7 @@ fn change_sign(shrink: f64) -> String {
 /// The interval of a change with the signs of [`change_sign`], which are left out where both ends share them.
 fn change_interval([low, high]: [f64; 2]) -> String {
     let text = if low < 0.0 && high > 0.0 {
-        format!("{} to {}", change_sign(high), change_sign(low))
+        format!("{} to {}", change_sign(high, None), change_sign(low, None))
     } else if high <= 0.0 {
         percent_interval([-high, -low])
     } else {
@@ -45,7 +45,7 @@ impl Cells {
             (Some(part), _) if part < -1e3 => "worse".into(),
             (Some(part), ends) => {
                 let ends = ends.map_or(String::new(), change_interval);
-                format!("{}{ends}", change_sign(part))
+                format!("{}{ends}", change_sign(part, change.ci95))
             }
             (None, _) => "at the noise floor".into(),
         };

@@ -10,6 +10,9 @@ use crate::report::{
 use gapscope_diagnosis::schema::{Diagnosis, Estimate, FoundEffect, Parameter, Quantity, Verdict};
 use std::collections::BTreeMap;
 
+/// Columns for the joints of an effect.
+const PLACE: usize = 22;
+
 /// The effects of a robot whose logs hold its torque.
 pub fn of(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
     if diagnosis.effects.is_empty() {
@@ -27,46 +30,56 @@ pub fn of(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
             differ.map(|sum| clean(&combination(sum))).collect()
         })
     };
-    rows(&together(diagnosis), &diagnosis.joints, "alone", &sums, paint)
+    let alone = ["alone shrinks the gap by", "alone grows the gap by"];
+    rows(&together(diagnosis), &diagnosis.joints, alone, &sums, paint)
 }
 
-/// One effect a row, its parameters behind it or, where these are too wide, below. `changes` is how a shrink comes about;
-/// `instead` has what stands in the place of an effect's parameters, if anything does.
+/// One effect a row, its parameters behind it or, where these are too wide, below. The words before a shrink and a growth say
+/// how it comes about; `instead` has what stands in the place of an effect's parameters, if anything does.
 pub fn rows(
     effects: &[FoundEffect],
     all: &[String],
-    changes: &str,
+    [shrinks, grows]: [&str; 2],
     instead: &dyn Fn(&FoundEffect) -> Option<Vec<String>>,
     paint: &Paint,
 ) -> Vec<String> {
     let shown = &effects[..effects.len().min(EFFECTS)];
     let names: Vec<String> = shown.iter().map(|e| capital(&effect(&e.kind))).collect();
     let places: Vec<String> = shown.iter().map(|e| joint_list(&e.joints, all)).collect();
-    let (first, second) = (column(names.iter().map(String::as_str), 28), column(places.iter().map(String::as_str), 34));
+    let first = column(names.iter().map(String::as_str), 28);
+    // A place too long for the column takes a line with the name; what is known of the effect goes below.
+    let second = column(places.iter().filter(|place| place.chars().count() <= PLACE).map(String::as_str), PLACE);
     let mut rows = vec![];
     for ((found, name), place) in shown.iter().zip(&names).zip(&places) {
         let alone = match found.shrink.torque {
-            Some(s) if s < 0.0 => format!(", {changes} grows the gap by {}", percent(-s)),
-            Some(s) => format!(", {changes} shrinks the gap by {}", percent(s)),
+            Some(s) if s < 0.0 => format!(", {grows} {}", percent(-s)),
+            Some(s) => format!(", {shrinks} {}", percent(s)),
             None => String::new(),
         };
-        let line = format!("{}  {:>4} % sure{alone}", padded(place, second), probability_figure(found.confidence));
+        let sure = format!("{:>4} % sure{alone}", probability_figure(found.confidence));
+        let line = format!("{}  {sure}", padded(place, second));
         let name = paint.bold(&padded(name, first));
-        if let Some(lines) = instead(found) {
-            rows.push(format!("{name}  {line}"));
-            rows.extend(lines.iter().map(|line| format!("  {line}")));
-            continue;
+        let room = paint.width.saturating_sub(INDENT + first + 2);
+        let stacked = place.chars().count() > PLACE || line.chars().count() > room;
+        let details = match instead(found) {
+            Some(lines) => lines,
+            None => {
+                let values = found.parameters.iter().filter_map(|(name, p)| value(&found.kind, name, p));
+                Some(values.collect::<Vec<_>>().join("; ")).filter(|text| !text.is_empty()).into_iter().collect()
+            }
+        };
+        match details.as_slice() {
+            _ if stacked => {
+                rows.push(format!("{name}  {place}"));
+                rows.push(format!("  {}", sure.trim_start()));
+            }
+            [one] if line.chars().count() + 2 + one.chars().count() <= room => {
+                rows.push(format!("{name}  {line}  {one}"));
+                continue;
+            }
+            _ => rows.push(format!("{name}  {line}")),
         }
-        let details: Vec<String> =
-            found.parameters.iter().filter_map(|(name, p)| value(&found.kind, name, p)).collect();
-        let details = details.join("; ");
-        let columns = INDENT + first + 4 + line.chars().count();
-        if columns + details.chars().count() <= paint.width {
-            rows.push(format!("{name}  {line}  {details}"));
-        } else {
-            rows.push(format!("{name}  {line}"));
-            rows.push(format!("  {details}"));
-        }
+        rows.extend(details.iter().map(|line| format!("  {line}")));
     }
     rest(rows, effects.len(), EFFECTS, "effect")
 }
@@ -76,9 +89,23 @@ fn value(kind: &str, name: &str, found: &Parameter) -> Option<String> {
     let text = match found {
         Parameter::Single(single) => one(single)?,
         Parameter::PerJoint(map) if map.len() == 1 => one(map.values().next()?)?,
-        Parameter::PerJoint(map) => format!("{}{}", span(map.values())?, widest(map)),
+        Parameter::PerJoint(map) => by_unit(map)?,
     };
     Some(said_of(kind, name, &text))
+}
+
+/// The span of the joints, one for each unit.
+fn by_unit(map: &BTreeMap<String, Estimate>) -> Option<String> {
+    let mut units: Vec<&str> = map.values().map(|estimate| estimate.unit.as_str()).collect();
+    units.sort_unstable();
+    units.dedup();
+    let of = |unit: &&str| {
+        let same: BTreeMap<String, Estimate> =
+            map.iter().filter(|(_, e)| e.unit == **unit).map(|(joint, e)| (joint.clone(), e.clone())).collect();
+        Some(format!("{}{}", span(same.values())?, widest(&same)))
+    };
+    let spans: Option<Vec<String>> = units.iter().map(of).collect();
+    spans.filter(|spans| !spans.is_empty()).map(|spans| spans.join("; "))
 }
 
 /// `200 ± 17 N s/m`; `None` for a vector.

@@ -88,7 +88,7 @@ fn a_log_without_torque_goes_to_its_answer_by_one_command() {
         let output =
             gapscope(dir.path(), ["diagnose", "robot.urdf", file(name).to_str().unwrap(), "--out", "out", "--force"]);
         assert!(output.status.success() && said(&output).contains("no torque"), "{name}: {}", said(&output));
-        let degrees = said(&output).contains("the positions are in degrees");
+        let degrees = said(&output).contains("positions are in degrees");
         assert_eq!(degrees, name.starts_with("lerobot"), "{name}: {}", said(&output));
         let output = gapscope(dir.path(), ["inspect", file(name).to_str().unwrap(), "--model", "robot.urdf"]);
         assert!(output.status.success() && said(&output).contains("command"), "{name}: {}", said(&output));

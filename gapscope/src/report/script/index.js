@@ -42,6 +42,8 @@
       card.removeAttribute("id");
       return card;
     })));
+    // They stand above the table, and the second tick may be far down.
+    if (ticked.length === 2) beside.scrollIntoView({ block: "start" });
   }));
   filter();
 })();

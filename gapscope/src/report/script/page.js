@@ -43,6 +43,17 @@ document.querySelectorAll("[data-copy]").forEach((button) => button.addEventList
     button.textContent = "Selected: press Ctrl+C";
   }
 }));
+// The link of the section in sight stands out, and stays in sight itself.
+const links = new Map([...document.querySelectorAll(".contents a")].map((link) => [link.hash.slice(1), link]));
+const inSight = new Set();
+const watch = new IntersectionObserver((entries) => {
+  entries.forEach(({ target, isIntersecting }) => { isIntersecting ? inSight.add(target.id) : inSight.delete(target.id); });
+  const first = [...links.keys()].find((id) => inSight.has(id));
+  links.forEach((link, id) => link.toggleAttribute("aria-current", id === first));
+  const link = links.get(first), bar = link?.parentElement;
+  if (bar) bar.scrollLeft = link.offsetLeft - 0.5 * (bar.clientWidth - link.offsetWidth);
+}, { rootMargin: "-15% 0px -70% 0px" });
+document.querySelectorAll("main > section").forEach((section) => watch.observe(section));
 const hint = () => document.querySelectorAll(".scroll").forEach((box) => {
   box.classList.toggle("more", box.scrollWidth > box.clientWidth + 2 && box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
 });

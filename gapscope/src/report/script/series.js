@@ -38,7 +38,7 @@ if (live && data.series.length && window.uPlot) {
       legend: { show: false }, cursor: { drag: { x: true, y: false }, focus: { prox: 24 }, sync: { key: "time" } },
       scales: { x: { time: false } }, series: list,
       bands: [{ series: [1, 2], fill: shade }, { series: [2, 1], fill: shade }],
-      axes: [{ ...axis, size: 28 }, { ...axis, label: words.what + ", " + current.unit, size: 56, space: 24 }],
+      axes: [{ ...axis, size: 8, values: () => [] }, { ...axis, label: words.what + ", " + current.unit, size: 56, space: 24 }],
       hooks: { setCursor: [() => { say(); if (chart.cursor.idx != null) pose(current.t[chart.cursor.idx]); }], setScale: [same] },
     };
   };
@@ -47,10 +47,10 @@ if (live && data.series.length && window.uPlot) {
     const { series: lines, axes, bands: _, hooks: __, ...rest } = options();
     return {
       ...rest, height: low(), series: [{}, ...lines.slice(2).map((line, i) => ({ ...line, fill: i ? undefined : color("--shade") }))],
-      axes: [{ ...axes[0], label: "time, s", size: 46 }, { ...axes[1], label: "gap, " + current.unit, space: 18 }], hooks: { setScale: [same] },
+      axes: [{ ...axes[1], scale: "x", side: 2, label: "time, s", size: 46, space: 50 }, { ...axes[1], label: "gap, " + current.unit, space: 18 }], hooks: { setScale: [same] },
     };
   };
-  const tall = () => Math.max(170, Math.min(250, box.clientWidth * 0.35)), low = () => Math.max(150, Math.min(190, box.clientWidth * 0.25));
+  const tall = () => Math.max(160, Math.min(190, box.clientWidth * 0.35)), low = () => Math.max(150, Math.min(160, box.clientWidth * 0.25));
   const same = (one, key) => {
     if (key !== "x" || moving || !chart || !errors) return;
     moving = true;

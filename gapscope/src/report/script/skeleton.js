@@ -8,27 +8,39 @@ if (scene && skeleton) {
   const joints = scene.joints.length;
   const moving = ([name, points]) => ({ name, rows: points.map((row) => unpack(row, scene.step)) });
   const plays = scene.plays.map((play) => ({ ...play, skeletons: play.skeletons.map(moving) }));
-  // Center and radius as in skeleton.rs, so that the picture does not jump when the script takes over.
+  // Center and size as in skeleton.rs, so that the picture does not jump when the script takes over.
   const low = [0, 0, 0], high = [0, 0, 0];
   const stands = [rows, ...plays.map((play) => play.skeletons[0].rows)];
   stands.forEach((rows) => rows.forEach((row, c) => row.forEach((x) => {
     low[c % 3] = Math.min(low[c % 3], x);
     high[c % 3] = Math.max(high[c % 3], x);
   })));
-  const center = low.map((x, c) => 0.5 * (x + high[c]));
-  let radius = 0;
-  stands.forEach((rows) => {
-    for (let p = 0; p < rows.length; p += 3) {
-      rows[p].forEach((x, k) => { radius = Math.max(radius, Math.hypot(x - center[0], rows[p + 1][k] - center[1], rows[p + 2][k] - center[2])); });
-    }
-  });
-  radius = Math.max(radius, Math.hypot(...center)) || 1;
+  const center = [0, 1].map((c) => 0.5 * (low[c] + high[c]));
   let yaw = -0.6, pitch = 0.3, frame = scene.still, playing = null, rolled = 0;
+  // How far from the vertical and how high each point comes, the base among them.
+  const places = [[Math.hypot(...center), 0]];
+  stands.forEach((rows) => {
+    for (let p = 0; p < rows.length; p += 3) rows[p].forEach((x, k) => places.push([Math.hypot(x - center[0], rows[p + 1][k] - center[1]), rows[p + 2][k]]));
+  });
+  let wide = 0, half = 1, rise = 0;
+  const fit = () => {
+    const [sin, cos] = [Math.abs(Math.sin(pitch)), Math.cos(pitch)];
+    let down = 0, up = 0;
+    places.forEach(([away, z]) => {
+      wide = Math.max(wide, away);
+      down = Math.min(down, z * cos - away * sin);
+      up = Math.max(up, z * cos + away * sin);
+    });
+    down = Math.min(down, -sin * (0.35 * wide + Math.hypot(...center)));
+    half = 1.1 * Math.max(wide, 0.5 * (up - down)) || 1;
+    rise = 0.5 * (up + down);
+  };
+  fit();
 
   const project = ([x, y, z]) => {
-    const p = [(x - center[0]) / radius, (y - center[1]) / radius, (z - center[2]) / radius];
+    const p = [x - center[0], y - center[1]];
     const away = p[0] * Math.sin(yaw) + p[1] * Math.cos(yaw);
-    return [p[0] * Math.cos(yaw) - p[1] * Math.sin(yaw), -(p[2] * Math.cos(pitch) + away * Math.sin(pitch)), away];
+    return [(p[0] * Math.cos(yaw) - p[1] * Math.sin(yaw)) / half, (rise - z * Math.cos(pitch) - away * Math.sin(pitch)) / half, away / half];
   };
   const at = (rows, k) => {
     const list = [], from = Math.floor(k), part = k - from, to = Math.min(from + 1, rows[0].length - 1);
@@ -83,7 +95,7 @@ if (scene && skeleton) {
     const ring = [];
     for (let k = 0; k <= 48; k++) {
       const angle = 2 * Math.PI * k / 48;
-      ring.push(project([0.35 * radius * Math.cos(angle), 0.35 * radius * Math.sin(angle), 0]).slice(0, 2).map((x) => x.toFixed(3)));
+      ring.push(project([0.35 * wide * Math.cos(angle), 0.35 * wide * Math.sin(angle), 0]).slice(0, 2).map((x) => x.toFixed(3)));
     }
     floor.setAttribute("points", ring.join(" "));
     ghosts.replaceChildren(...(play ? play.skeletons.slice(1).flatMap(ghost) : []));
@@ -120,6 +132,7 @@ if (scene && skeleton) {
     if (!turned) return;
     yaw = yaw0 - (event.clientX - x) * 0.01;
     pitch = Math.max(-1.5, Math.min(1.5, pitch0 + (event.clientY - y) * 0.01));
+    fit();
     draw();
   });
   window.addEventListener("pointerup", () => {
@@ -134,6 +147,7 @@ if (scene && skeleton) {
     event.preventDefault();
     yaw += turn[0];
     pitch = Math.max(-1.5, Math.min(1.5, pitch + turn[1]));
+    fit();
     draw();
   });
   groups.forEach((group, j) => {
@@ -170,6 +184,8 @@ if (scene && skeleton) {
     if (seen.bottom < 0.5 * seen.height || seen.top > innerHeight - 0.5 * seen.height) skeleton.scrollIntoView({ block: "center" });
     const play = plays.find((play) => play.name === playing);
     document.querySelector(".rollout-key").hidden = !play || play.skeletons.length < 2;
+    const short = (x) => String(Number(x.toPrecision(2)));
+    if (play) document.querySelector(".pace").textContent = short(play.length) + " s" + (play.pace < 0.95 ? ", " + short(1 / play.pace) + " times slower" : "");
     const start = performance.now(), first = frame >= time.length - 1 ? 0 : frame, t0 = time[Math.floor(first)];
     let k = Math.floor(first);
     const step = (now) => {

@@ -35,11 +35,14 @@ fn reach(diagnosis: &Diagnosis) -> String {
     match (change.before, change.after) {
         (Some(before), Some(after)) => format!(
             "Run free under its set points, the arm found here is off by {}; {nominal} is off by {}.",
-            mrad(after),
-            mrad(before)
+            angle(after, before),
+            angle(before, after)
         ),
         (Some(before), None) => {
-            format!("The arm found here cannot be run free on these logs; {nominal} is off by {}.", mrad(before))
+            format!(
+                "The arm found here cannot be run free on these logs; {nominal} is off by {}.",
+                angle(before, before)
+            )
         }
         _ => "No arm can be run free on these logs.".into(),
     }
@@ -58,11 +61,14 @@ fn caution(diagnosis: &Diagnosis) -> String {
         left if left > 0.0005 => format!("{} of the squared gap", percent(left)),
         _ => "nothing".into(),
     };
-    format!("The gap is largest at {joint}, {} rms; {left} stays unexplained.", mrad(*rms))
+    format!("The gap is largest at {joint}, {} rms; {left} stays unexplained.", angle(*rms, *rms))
 }
 
-fn mrad(value: f64) -> String {
-    format!("{}\u{a0}mrad", figure(1e3 * value))
+/// An error of position, rad, in the unit that suits the larger of the two that are told together.
+pub fn angle(value: f64, beside: f64) -> String {
+    // What would print as a thousand is a whole one.
+    let (scale, unit) = if value.max(beside) < 0.9995 { (1e3, "mrad") } else { (1.0, "rad") };
+    format!("{}\u{a0}{unit}", figure(scale * value))
 }
 
 #[cfg(test)]
@@ -113,6 +119,7 @@ mod tests {
     fn the_answer_says_what_how_far_and_where() {
         let [cause, reach, caution] = answer(&arm("coulomb_friction", "coulomb", 0.2, "N m"));
         assert_eq!(cause, "elbow rubs: 0.200\u{a0}N\u{a0}m of dry friction that the model lacks.");
+        assert_eq!(angle(0.0917, 1.0), "0.0917\u{a0}rad");
         assert!(reach.contains("is off by 2.00\u{a0}mrad; the given servo is off by 40.0\u{a0}mrad"), "{reach}");
         assert_eq!(
             caution,

@@ -1,0 +1,139 @@
+//! What to change in a model of a servo arm, ready to paste: what its joints have, and the actuators that drive them.
+
+use crate::report::{reproduce, words};
+use gapscope_effects::Effect;
+use gapscope_servo::schema::{Diagnosis, FoundDrive};
+use gapscope_servo::{DriveModel, ServoModel, Signal};
+use maud::{Markup, html};
+
+/// Kinds that a joint of a URDF or an MJCF has a number for.
+const CARRIED: [&str; 3] = ["coulomb_friction", "viscous_friction", "armature"];
+
+/// The boxes; `None` where no joint's torque is determined.
+pub fn render(diagnosis: &Diagnosis, corrected: &ServoModel) -> Option<Markup> {
+    let known = |joint: &&String| diagnosis.drive.get(*joint).is_some_and(has_torque);
+    let joints: Vec<&String> = diagnosis.joints.iter().filter(known).collect();
+    let drives: Vec<(&String, &DriveModel)> =
+        joints.iter().filter_map(|joint| Some((*joint, corrected.drive.get(*joint)?))).collect();
+    let urdf: Vec<String> = joints.iter().filter_map(|joint| urdf(joint, corrected)).collect();
+    let mjcf: Vec<String> = joints.iter().filter_map(|joint| mjcf(joint, corrected)).collect();
+    let actuators: Vec<String> = drives.iter().filter_map(|(joint, drive)| actuator(joint, drive)).collect();
+    if actuators.is_empty() && mjcf.is_empty() {
+        return None;
+    }
+    let lacking: Vec<String> =
+        diagnosis.effects.iter().map(|e| e.kind.clone()).filter(|kind| !CARRIED.contains(&kind.as_str())).collect();
+    let open: Vec<String> = diagnosis.joints.iter().filter(|joint| !known(joint)).cloned().collect();
+    let boxed = |id: &str, title: &str, lines: &[String]| {
+        html! { @if !lines.is_empty() { div { h3 { (title) } (reproduce::boxed(id, &lines.join("\n"))) } } }
+    };
+    Some(html! {
+        p { "Numbers take the place of what the file has. Units are N m, N m s/rad, kg m² and N m/rad." }
+        div.grid-two.top {
+            (boxed("paste-urdf", "Elements for the joints of a URDF", &urdf))
+            (boxed("paste-mjcf", "Attributes for the joints of an MJCF", &mjcf))
+            (boxed("paste-actuators", "Actuators of an MJCF, driven by the set points", &actuators))
+        }
+        @if !lacking.is_empty() {
+            p.note { "Left out, as neither has a number for it: " (words::list(&words::effects(&lacking), "and")) ". corrected.json has them." }
+        }
+        @if !open.is_empty() {
+            p.note { "Left out, as the logs tell ratios alone of its torques: " (words::joints(&open, &diagnosis.joints)) "." }
+        }
+    })
+}
+
+/// Whether a joint's torques are known in N m, and not as ratios alone.
+fn has_torque(drive: &FoundDrive) -> bool {
+    let scale = |name: &str| name == "stiffness" || name.starts_with("torque_per");
+    drive.constants.iter().any(|(name, found)| scale(name) && found.determined)
+        || drive.given.iter().any(|name| scale(name))
+}
+
+fn urdf(joint: &str, corrected: &ServoModel) -> Option<String> {
+    let [friction, damping, _] = numbers(joint, corrected);
+    (friction.is_some() || damping.is_some()).then(|| {
+        let of = |number: Option<f64>| short(number.unwrap_or(0.0));
+        format!("<dynamics damping=\"{}\" friction=\"{}\"/>  <!-- {joint} -->", of(damping), of(friction))
+    })
+}
+
+fn mjcf(joint: &str, corrected: &ServoModel) -> Option<String> {
+    let [friction, damping, armature] = numbers(joint, corrected);
+    let attributes = [("damping", damping), ("frictionloss", friction), ("armature", armature)];
+    let told: Vec<String> =
+        attributes.iter().filter_map(|(name, number)| Some(format!("{name}=\"{}\"", short((*number)?)))).collect();
+    (!told.is_empty()).then(|| format!("{joint}:  {}", told.join(" ")))
+}
+
+/// Dry friction, viscous friction and rotor inertia of a joint.
+fn numbers(joint: &str, corrected: &ServoModel) -> [Option<f64>; 3] {
+    let mut found = [None; 3];
+    for effect in &corrected.effects {
+        match effect {
+            Effect::CoulombFriction(own) => found[0] = own.coulomb.get(joint).copied().or(found[0]),
+            Effect::ViscousFriction(own) => found[1] = own.viscous.get(joint).copied().or(found[1]),
+            Effect::Armature(own) => found[2] = own.armature.get(joint).copied().or(found[2]),
+            _ => {}
+        }
+    }
+    found
+}
+
+/// A position actuator: torque kp (set point − q) − kv q̇, within its limit.
+fn actuator(joint: &str, drive: &DriveModel) -> Option<String> {
+    if drive.follows == Signal::Effort {
+        return None;
+    }
+    let stiffness = short(drive.torque_per_unit * drive.feedback);
+    let mut text = format!("<position joint=\"{joint}\" kp=\"{stiffness}\" kv=\"{}\"", short(drive.damping));
+    if let Some(limit) = drive.limit {
+        let torque = short(drive.torque_per_unit * limit);
+        text += &format!(" forcerange=\"-{torque} {torque}\"");
+    }
+    Some(text + "/>")
+}
+
+/// A number to four digits, as a file takes it.
+fn short(x: f64) -> String {
+    format!("{x:.3e}").parse::<f64>().unwrap_or(x).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gapscope_effects::{Armature, CoulombFriction};
+
+    #[test]
+    fn a_joint_gets_its_friction_and_its_actuator() {
+        let drive = DriveModel {
+            follows: Signal::Voltage,
+            torque_per_unit: 0.25,
+            feedback: 2.0,
+            gain: None,
+            damping: 0.0123456,
+            latency: 0.0,
+            limit: Some(6.0),
+            speed_limit: None,
+            dead_band: 0.0,
+            load_rise: None,
+            link_side: false,
+        };
+        let said = actuator("elbow", &drive).unwrap();
+        assert_eq!(said, r#"<position joint="elbow" kp="0.5" kv="0.01235" forcerange="-1.5 1.5"/>"#);
+        assert_eq!(actuator("elbow", &DriveModel { follows: Signal::Effort, ..drive }), None);
+        let model = ServoModel {
+            schema: gapscope_servo::MODEL_SCHEMA.into(),
+            robot: "arm".into(),
+            weights: [].into(),
+            effects: vec![
+                Effect::CoulombFriction(CoulombFriction { coulomb: [("elbow".to_owned(), 0.2)].into() }),
+                Effect::Armature(Armature { armature: [("elbow".to_owned(), 0.004)].into() }),
+            ],
+            drive: [].into(),
+        };
+        assert_eq!(urdf("elbow", &model).unwrap(), r#"<dynamics damping="0" friction="0.2"/>  <!-- elbow -->"#);
+        assert_eq!(mjcf("elbow", &model).unwrap(), r#"elbow:  frictionloss="0.2" armature="0.004""#);
+        assert_eq!(mjcf("wrist", &model), None);
+    }
+}

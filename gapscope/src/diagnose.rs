@@ -255,3 +255,18 @@ fn files(outcome: &Outcome, setting: &Setting, out: &Path) -> Result<Vec<(&'stat
         (NEXT_EXPERIMENT, motion),
     ])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_turned_by_its_name_and_a_factor_above_zero() {
+        for wrong in ["X=2", "TWENTY_TO_ONE", "TWENTY_TO_ONE=0", "TWENTY_TO_ONE=inf", "TWENTY_TO_ONE=x"] {
+            let error = turned(wrong).unwrap_err().to_string();
+            assert!(error.contains(wrong) && error.contains("TWENTY_TO_ONE, PRICE_OF_OUTSIDE"), "{error}");
+        }
+        // As it is: other tests of this process diagnose.
+        assert!(turned("TWENTY_TO_ONE=1").is_ok());
+    }
+}

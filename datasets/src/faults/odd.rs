@@ -7,7 +7,7 @@ use gapscope_dynamics::Model;
 use rayon::prelude::*;
 
 /// More logs than this are taken to be alike: each is left out once.
-const MOST_LOGS: usize = 12;
+pub(crate) const MOST_LOGS: usize = 12;
 /// Joints that leave less than this of their effort, squared, in all logs leave no log odd.
 const LITTLE: f64 = 0.03;
 /// A log is odd where the others, left alone, leave less by this in all joints together, nats: a tenth in one of them.

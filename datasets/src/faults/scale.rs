@@ -30,7 +30,7 @@ pub(crate) fn scales(
     let n = model.dof();
     let plain = weigh(model, sample, &vec![1.0; n], active, Freedom::ORDINARY);
     let first = first_scales(model, sample, active);
-    let mut found = Vec::new();
+    let mut found: Vec<Result<Fault, Doubt>> = Vec::new();
     let mut taken = vec![1.0; n];
     if scales_cost(&first, active) > 0.0 {
         let (mut scales, mut best) = fine_scales(model, sample, first, active);
@@ -47,9 +47,15 @@ pub(crate) fn scales(
             // Of the sign friction is a witness too.
             let drives = scales[j] < 0.0 && friction_drives(sample, &torque, j);
             if alone_of(&scales, j) && !own && !impossible && !drives {
+                let (scale, with) = (scales[j], best.score);
                 scales[j] = 1.0;
                 (scales, best) = fine_scales(model, sample, scales, active);
                 cost = scales_cost(&scales, active);
+                let either = |score: f64| score.max(weigh_either(model, sample, &scales, active).score);
+                // A rotor that the description lacks makes a large scale; what makes a negative one is asked.
+                if !alone && scale < 0.0 && with - either(best.score) > 2.0 * SURE {
+                    found.push(Err(unwitnessed(&model.joints()[j].name)));
+                }
             }
         }
         // Joints that do as well as logged are as logged.
@@ -106,6 +112,17 @@ pub(crate) fn scales(
     }
     found.extend(clipped(logs, model, sample, &taken, active).into_iter().map(Ok));
     found
+}
+
+/// What is asked of a joint that bears too little for its sign to be beyond doubt.
+fn unwitnessed(joint: &str) -> Doubt {
+    Doubt {
+        question: format!(
+            "is the effort of {joint} counted the other way round? The model then explains it far better"
+        ),
+        joints: vec![joint.to_owned()],
+        effects: Vec::new(),
+    }
 }
 
 /// Scales as faults: those that are alike as one, signs apart from sizes.

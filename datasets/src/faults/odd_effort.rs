@@ -21,6 +21,8 @@ const GOES: f64 = 0.4;
 /// the prediction.
 const BESIDE: f64 = 0.5;
 const BESIDE_MORE: f64 = 0.2;
+/// Scales of joints of one log that differ by less than this, as a logarithm, are one.
+const ALIKE_SCALES: f64 = 0.2;
 /// Fewer places tell nothing.
 const FEWEST: usize = 30;
 
@@ -68,7 +70,14 @@ pub(crate) fn odd_efforts(logs: &Logs, model: &Model, sample: &Sample, active: &
             Some((j, FaultKind::EffortAbsolute, one))
         });
         let all: Vec<_> = odd.iter().copied().chain(beside).collect();
-        found.extend(all.into_iter().map(|(j, kind, one)| fault(logs, e, j, kind, one)));
+        // Scales that are nearly alike are one: that which has a name, or that of which the others tell best.
+        let scaled = || all.iter().filter(|(_, kind, _)| *kind == FaultKind::EffortScale).map(|(_, _, one)| *one);
+        let named = scaled().find(|one| effort_unit(one.gain, 0.0, None).is_some());
+        let clearest = || scaled().max_by(|a, b| a.correlation.total_cmp(&b.correlation));
+        let best = named.or_else(clearest).map_or(1.0, |one| one.gain);
+        let shared =
+            |one: Beside| if (one.gain / best).ln().abs() < ALIKE_SCALES { Beside { gain: best, ..one } } else { one };
+        found.extend(all.iter().map(|&(j, kind, one)| fault(logs, e, j, kind, shared(one))));
     }
     found
 }

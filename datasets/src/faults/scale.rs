@@ -71,14 +71,12 @@ pub(crate) fn scales(
                 (scales, best, cost) = (without, other, other_cost);
             }
         }
-        // The nearest thing to a scale is a robot whose bodies are described badly; not all of them alike.
-        let shared = (0..n).filter(|&j| active[j]).all(|j| scales[j] != 1.0);
-        let margin = if shared && n > 1 {
-            best.score - cost - plain.score
-        } else {
-            let as_logged = weigh_either(model, sample, &vec![1.0; n], active);
-            weigh_either(model, sample, &scales, active).score - cost - as_logged.score
-        };
+        // The nearest thing to a scale is a robot whose bodies are described badly; not all of them alike, but for a tool that is
+        // described and not there. So one that all share must be the likelier robot, too.
+        let shared = (0..n).filter(|&j| active[j]).all(|j| scales[j] != 1.0) && n > 1;
+        let as_logged = weigh_either(model, sample, &vec![1.0; n], active);
+        let fair = weigh_either(model, sample, &scales, active).score - cost - as_logged.score;
+        let margin = if shared { best.score - cost - plain.score } else { fair };
         let mean = |of: &super::weigh::Weighed| {
             let scaled: Vec<f64> =
                 (0..n).filter(|&j| scales[j] != 1.0).map(|j| of.unexplained[j].min(1.0).ln()).collect();
@@ -93,7 +91,8 @@ pub(crate) fn scales(
         let asks = best.asked + 1.5 * SURE < plain.asked;
         let bent = asks && (shared || turned || size > 1.6);
         let explains = after < 0.45 && (after < less * before || bent);
-        if margin > if alone { 2.0 * SURE } else { SURE } && explains {
+        let sure = if alone { 2.0 * SURE } else { SURE };
+        if margin > sure && (!shared || fair > SURE) && explains {
             taken.clone_from(&scales);
             found.extend(said(logs, &scales, &best, &plain, (sample, &torque)));
         } else if margin > 0.5 * SURE && cost > 0.0 && (explains || asks && after < 0.45) && !alone {

@@ -93,7 +93,7 @@ impl Search {
             part.dynamics();
             part
         };
-        let own = part(vec![self.episodes[odd].clone()], true);
+        let mut own = part(vec![self.episodes[odd].clone()], true);
         let of_robot = |fault: &Fault| fault.gravity.is_some();
         if own.faults.is_empty() || own.faults.iter().any(of_robot) {
             return None;
@@ -106,9 +106,19 @@ impl Search {
         if own.faults.iter().all(shared) {
             return None;
         }
-        // All logs as both leave them.
-        let mut mended = rest.episodes.clone();
-        mended.insert(odd, own.episodes[0].clone());
+        // All logs as both leave them. One log alone tells a unit less well than all together.
+        let with = |log: Episode| {
+            let mut mended = rest.episodes.clone();
+            mended.insert(odd, log);
+            mended
+        };
+        let score = |log: &Episode| {
+            let all = sampled(&rest.model, &with(log.clone()));
+            weigh(&rest.model, &all, &vec![1.0; active.len()], active, Freedom::ORDINARY).score
+        };
+        let logged = &self.episodes[odd];
+        odd::with_named_units(&rest.model, &mut own.faults, &mut own.episodes[0], logged, score);
+        let mended = with(own.episodes[0].clone());
         let after = sampled(&rest.model, &mended);
         if !odd::is_like_the_others(&rest.model, sample, &after, odd, active) {
             return None;

@@ -35,7 +35,7 @@ const TOLD: f64 = 0.7;
 /// shift, ...
 const OTHERS: f64 = 0.2;
 /// ... and where it is left with this part of what it left at most: what looks like a shift in one log does in all.
-const ONE: f64 = 0.6;
+const ONE: f64 = 0.45;
 
 /// What is asked of a shift.
 #[derive(Debug, Clone, Copy)]

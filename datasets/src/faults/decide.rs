@@ -235,12 +235,13 @@ impl Decision<'_> {
     }
 }
 
-/// Whether joints stand under each other's names: in the mean (geometric) they leave at most a part of their effort, squared,
-/// under their own, and each of them at most twice that part, or next to nothing.
+/// Whether joints stand under each other's names: each leaves at most a part of its effort, squared, under its own. Or, in the
+/// mean (geometric) they leave half of that part, and each of them twice that part or next to nothing.
 fn are_exchanged(joints: &[usize], logged: &[f64], own: &[f64], part: f64) -> bool {
     let times = |&j: &usize| own[j] / logged[j];
     let mean = (joints.iter().map(|j| times(j).ln()).sum::<f64>() / joints.len().max(1) as f64).exp();
-    mean <= part && joints.iter().all(|j| times(j) <= 2.0 * part || own[*j] < NOTABLE)
+    let most = |part: f64| joints.iter().all(|j| times(j) <= part || own[*j] < NOTABLE);
+    joints.iter().all(|j| times(j) <= part) || mean <= 0.5 * part && most(2.0 * part)
 }
 
 /// What scales of the effort cost: one that all share as much as one alone.

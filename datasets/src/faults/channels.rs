@@ -1,12 +1,19 @@
 //! What is wrong with a channel by itself: wrapped angles, samples that repeat, positions that are set points, velocities.
 
 use super::change::{Change, turn_of};
+use super::units::CLOCKS;
 use super::{Fault, FaultKind};
 use crate::check::Logs;
 use crate::robust::median;
+use crate::time_stamps::LONGEST_STEP;
 
 /// Share of samples in motion that repeat the position before, from which a log is faster than its source.
 const REPEATED: f64 = 0.45;
+
+/// Steps of time are no shorter, s: no robot is logged at over 20 kHz.
+const SHORTEST_STEP: f64 = 5e-5;
+/// Rates of logs of one robot differ by less than this factor, as a logarithm.
+const NEAR: f64 = 3.5;
 
 /// Steps beside a wrap are shorter than this part of it.
 const ALONE: f64 = 0.3;
@@ -31,6 +38,23 @@ pub(crate) fn wrapped(logs: &Logs, e: usize) -> Vec<(usize, f64)> {
         (turn == 360.0 || whole == jumps.len()).then_some((j, turn))
     };
     (0..logs.model.dof()).filter_map(of).collect()
+}
+
+/// Logs whose stamps are in another unit: their steps are too long for any robot, and one unit with a name makes them those of a
+/// log, or like the other logs'. With each its factor, logged over true.
+pub(crate) fn slow_logs(logs: &Logs) -> Vec<(usize, f64)> {
+    let mut usual: Vec<f64> = logs.dt.iter().copied().filter(|dt| *dt <= LONGEST_STEP).collect();
+    let usual = median(&mut usual);
+    let of = |(e, dt): (usize, &f64)| {
+        let far = |unit: f64| usual.map_or(0.0, |usual| (dt / unit / usual).ln().abs());
+        let fits = |unit: &f64| (SHORTEST_STEP..=LONGEST_STEP).contains(&(dt / unit)) && far(*unit) < NEAR;
+        let mut units = CLOCKS.iter().map(|(_, unit)| *unit).filter(fits);
+        // Rows that are numbered have a step of one, whatever their rate.
+        let numbered = usual.is_none() && *dt == 1.0;
+        let unit = units.next().filter(|_| units.next().is_none() && !numbered)?;
+        (*dt > LONGEST_STEP).then_some((e, unit))
+    };
+    logs.dt.iter().enumerate().filter_map(of).collect()
 }
 
 /// The samples of a log that are readings, and the usual number of samples from one to the next, where all positions hold for several samples and then jump together.

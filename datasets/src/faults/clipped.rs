@@ -17,8 +17,10 @@ const PART: f64 = 0.1;
 const CUT: f64 = 0.08;
 /// ... and by this many standard errors: neighbouring places share half of their tents.
 const CLEAR: f64 = 6.0;
-/// Beside a clear one in the same log, or of the same joint, this part beyond is enough.
+/// Beside a clear one in the same log, or of the same joint, this part beyond is enough, ...
 const BESIDE: f64 = 0.03;
+/// ... and beside so many any.
+const SEVERAL: usize = 2;
 /// Fewer places tell nothing.
 const FEWEST: usize = 4;
 /// Rounds of fitting to what was cut off as the last round has it.
@@ -75,11 +77,10 @@ pub(crate) fn clipped(logs: &Logs, model: &Model, sample: &Sample, scales: &[f64
     let mut found: BTreeMap<usize, Vec<(&End, f64)>> = BTreeMap::new();
     for (end, (beyond, clear)) in ends.iter().zip(&told) {
         // What cuts one joint's effort off may do so with all, and in all logs: beside a clear one, less is enough.
-        let beside = ends
-            .iter()
-            .zip(&told)
-            .any(|(other, (_, clear))| *clear && (other.log == end.log || other.joint == end.joint));
-        if *clear || (beside && *beyond > BESIDE) {
+        let near =
+            |(other, (_, clear)): (&End, &(f64, bool))| *clear && (other.log == end.log || other.joint == end.joint);
+        let beside = ends.iter().zip(&told).filter(|pair| near(*pair)).count();
+        if *clear || (beside > 0 && *beyond > BESIDE) || (beside >= SEVERAL && *beyond > 0.0) {
             found.entry(end.joint).or_default().push((end, *beyond));
         }
     }
@@ -97,10 +98,14 @@ pub(crate) fn clipped(logs: &Logs, model: &Model, sample: &Sample, scales: &[f64
     found.into_iter().map(fault).collect()
 }
 
-/// The end of a joint's effort in one log, where a good part of the samples lie at it, or at its opposite.
-fn end(logs: &Logs, sample: &Sample, e: usize, j: usize) -> Option<End> {
-    let (time, effort) = (&logs.episodes[e].time, &logs.episodes[e].effort[j]);
-    let (low, high) = effort.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+/// Whether a good part of an effort's samples lie at its greatest value, or at its least, to the last digit.
+pub(crate) fn lies_at_its_ends(effort: &[f64]) -> bool {
+    at_ends(effort).1 >= SHARE
+}
+
+/// The samples of an effort that lie at an end, by the sign of it there, 0 elsewhere; and what part they are.
+fn at_ends(effort: &[f64]) -> (Vec<f64>, f64) {
+    let (low, high) = ends(effort);
     let held = |k: usize, end: f64| {
         let same = |k: usize| effort.get(k) == Some(&end);
         same(k) && (same(k + 1) || k > 0 && same(k - 1))
@@ -110,6 +115,18 @@ fn end(logs: &Logs, sample: &Sample, e: usize, j: usize) -> Option<End> {
         (0..effort.len()).filter(|&k| held(k, end)).for_each(|k| there[k] = sign);
     }
     let share = there.iter().filter(|x| **x != 0.0).count() as f64 / effort.len().max(1) as f64;
+    (there, share)
+}
+
+/// Least and greatest of an effort.
+fn ends(effort: &[f64]) -> (f64, f64) {
+    effort.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)))
+}
+
+/// The end of a joint's effort in one log, where a good part of the samples lie at it, or at its opposite.
+fn end(logs: &Logs, sample: &Sample, e: usize, j: usize) -> Option<End> {
+    let (time, effort) = (&logs.episodes[e].time, &logs.episodes[e].effort[j]);
+    let (there, share) = at_ends(effort);
     if share < SHARE {
         return None;
     }
@@ -120,6 +137,7 @@ fn end(logs: &Logs, sample: &Sample, e: usize, j: usize) -> Option<End> {
         .filter(|(_, part)| part.abs() > PART)
         .map(|(k, part)| (k, part.abs(), part.signum()))
         .collect();
+    let (low, high) = ends(effort);
     let size = high.abs().max(low.abs());
     (places.len() >= FEWEST).then_some(End { joint: j, log: e, share, size, places })
 }

@@ -17,8 +17,8 @@ const GLANCE: usize = 150;
 const MOST: usize = 9;
 /// By how much, in nats, an account must be the likelier one for no doubt to be left, ...
 pub(crate) const SURE: f64 = 15.0;
-/// ... and for a question.
-const LIKELY: f64 = 8.0;
+/// ... and for a question. Of healthy robots none has reached 8.
+const LIKELY: f64 = 12.0;
 /// By how much it must be likelier than any other account that is not as logged.
 const APART: f64 = 6.0;
 /// What an account costs by itself, in nats: units, zeros, clocks and orders are tried by the hundred.
@@ -28,6 +28,8 @@ const SCALE_COST: f64 = 8.0;
 /// What a clock gains, in nats, by steps of time that no log has, or by velocities that are all off by its factor; and a unit by
 /// each joint that it brings back from far beyond its limits.
 const BESIDE: f64 = 30.0;
+/// An account is far likelier where it is so by this many times what leaves no doubt.
+const FAR: f64 = 4.0;
 /// Zeros off by less than this are an effect, rad.
 const ZERO: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Under its own name a joint leaves at most this part of what it left under another's, squared: a spring beside friction that
@@ -76,7 +78,8 @@ impl Decision<'_> {
             velocity: motion::velocity_slope(logs),
         };
         let logged = self.weighed(self.model, sample, active);
-        let plain = logged.0.is_plain(active) && scene.far(&scene.range) == 0;
+        // What another scale of the efforts explains, another scale of the motion may explain better.
+        let plain = logged.1 == 0.0 && logged.0.is_plain(active) && scene.far(&scene.range) == 0;
         if plain && !scene.slow && !scene.velocity_asks() {
             return None;
         }
@@ -105,7 +108,15 @@ impl Decision<'_> {
                 // Another size of gravity is another planet: a clock is the likelier account.
                 let size = account.kind == Kind::Gravity && (account.value - 1.0).abs() > 0.1;
                 let unlikely = if size { 3.0 * COST } else { 0.0 };
-                (weighed.score - extra - COST - unlikely + beside, account, weighed)
+                // There are as many more orders of more joints.
+                let further = account.joints.len().saturating_sub(2) as f64;
+                let orders = match account.kind {
+                    Kind::Order => COST * further,
+                    // A robot that stands otherwise has them all turned round.
+                    Kind::Axis | Kind::Sign if account.joints.len() > 1 => 3.0 * COST,
+                    _ => 0.0,
+                };
+                (weighed.score - extra - COST - unlikely - orders + beside, account, weighed)
             })
             .collect();
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -136,16 +147,19 @@ impl Decision<'_> {
         let asks = logged.0.asked - weighed.asked;
         let bent = match account.kind {
             Kind::Clock => slow || asks > SURE || (scene.velocity_says(account.value) && after < 1.1 * before),
-            Kind::Zero | Kind::Sign | Kind::Axis => asks > 2.0 * SURE,
+            Kind::Zero | Kind::Sign | Kind::Axis | Kind::Gravity => asks > 2.0 * SURE,
             Kind::Scale => account.inside > 0 && after < 1.1 * before,
             _ => false,
         };
         let clearly = after < 0.1 && after < 0.2 * before;
         let notable = account.kind == Kind::Clock
+            || margin > FAR * sure
             || account.inside > 0
             || asks > MUCH
             || (0..n).any(|j| active[j] && logged.0.unexplained[j] > NOTABLE);
-        let explains = after < most && (after < 0.6 * before && (0..n).any(tells) || clearly || bent);
+        // Of what concerns one joint of many the others show little: far likelier is enough.
+        let better = after < 0.6 * before || margin > FAR * sure;
+        let explains = after < most && (better && (0..n).any(tells) || clearly || bent);
         // A turned base and the zero or the sign of its first joint are one and the same.
         let twins = |a: Kind, b: Kind| a == Kind::Gravity && matches!(b, Kind::Zero | Kind::Sign | Kind::Axis);
         let other = |other: &Account| other.kind != account.kind || other.joints != account.joints;
@@ -175,7 +189,12 @@ impl Decision<'_> {
             question += &format!("; or {}", phrase(logs, other));
         }
         let joints = account.joints.iter().map(|&j| logs.model.joints()[j].name.clone()).collect();
-        (explains && margin > sure).then_some(Err(Doubt { question, joints, effects: Vec::new() }))
+        // Far likelier than the log as it is, whatever it explains: no healthy robot has that.
+        (margin > if self.alone { sure } else { LIKELY }).then_some(Err(Doubt {
+            question,
+            joints,
+            effects: Vec::new(),
+        }))
     }
 
     /// An account with whatever scale of the efforts suits it, and what those scales cost.
@@ -216,9 +235,13 @@ impl Decision<'_> {
     }
 }
 
-/// Whether joints stand under each other's names: each leaves at most this part of its effort, squared, under its own.
+/// Whether joints stand under each other's names: each leaves at most a part of its effort, squared, under its own. Or, in the
+/// mean (geometric) they leave half of that part, and each of them twice that part or next to nothing.
 fn are_exchanged(joints: &[usize], logged: &[f64], own: &[f64], part: f64) -> bool {
-    joints.iter().all(|&j| own[j] <= part * logged[j])
+    let times = |&j: &usize| own[j] / logged[j];
+    let mean = (joints.iter().map(|j| times(j).ln()).sum::<f64>() / joints.len().max(1) as f64).exp();
+    let most = |part: f64| joints.iter().all(|j| times(j) <= part || own[*j] < NOTABLE);
+    joints.iter().all(|j| times(j) <= part) || mean <= 0.5 * part && most(2.0 * part)
 }
 
 /// What scales of the effort cost: one that all share as much as one alone.
@@ -259,5 +282,8 @@ mod tests {
         // A healthy used arm with a cable beside its elbow: the second pair is none better, nor is the elbow by much.
         let (logged, own) = ([0.153, 0.060, 0.611, 0.093, 0.045, 0.028], [0.159, 0.008, 0.209, 0.087, 0.027, 0.035]);
         assert!(!are_exchanged(&[1, 2, 4, 5], &logged, &own, 2.0 * OWN) && !are_exchanged(&[1, 2], &logged, &own, OWN));
+        // One of two leaves little either way, and one of two leaves much in both; the other tells.
+        assert!(are_exchanged(&[0, 1], &[0.034, 1.12], &[0.014, 0.023], OWN));
+        assert!(are_exchanged(&[0, 1], &[0.93, 0.94], &[0.043, 0.296], OWN));
     }
 }

@@ -14,6 +14,12 @@ const PLAIN: (f64, f64) = (0.6, 1.7);
 /// Dry friction of the wrong sign explains at least this part of what the model leaves of the effort, squared.
 const DRIVES: f64 = 0.5;
 
+/// A unit that no other is near is that unit within this, as a logarithm.
+const ALONE: f64 = 0.18;
+
+/// A scale that some joints ask for may be that of all where it is this many times too large or too small.
+const FAR: f64 = 4.0;
+
 /// A rotor may take up to so many times the torque that the description does.
 const ROTOR: f64 = 6.0;
 
@@ -196,13 +202,41 @@ pub(crate) fn first_scales(model: &Model, sample: &Sample, active: &[bool]) -> V
         return one;
     }
     let each: Vec<f64> = told.iter().map(|scale| scale.unwrap_or(1.0)).collect();
-    if !each.iter().any(|scale| *scale < 0.0) {
-        return each;
+    let mut accounts = vec![each];
+    // Of a robot whose efforts are all turned round, some joints alone seem to need nothing; and where friction or rotors make
+    // most of some efforts, a unit that all have looks like another one there.
+    if accounts[0].iter().any(|scale| *scale < 0.0) {
+        accounts.push(active.iter().map(|active| if *active { -1.0 } else { 1.0 }).collect());
     }
-    // Of a robot whose efforts are all turned round, some joints alone seem to need nothing.
-    let turned: Vec<f64> = active.iter().map(|active| if *active { -1.0 } else { 1.0 }).collect();
-    let score = |scales: &[f64]| weigh_either(model, sample, scales, active).score;
-    if score(&turned) > score(&each) { turned } else { each }
+    let shared = middle(&told).map(|scale| {
+        let shared = active.iter().map(|on| if *on { scale } else { 1.0 }).collect();
+        fine_scales(model, sample, shared, active).0
+    });
+    accounts.extend(shared.filter(|scales| scales.iter().all(|scale| *scale == 1.0 || is_far(*scale))));
+    if let [_] = accounts.as_slice() {
+        return accounts.remove(0);
+    }
+    let score = |scales: &Vec<f64>| weigh_either(model, sample, scales, active).score;
+    let scored = accounts.into_iter().map(|scales| (score(&scales), scales));
+    scored.max_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(|| vec![1.0; active.len()], |(_, scales)| scales)
+}
+
+/// The scale in the middle of those that joints ask for, where they agree about the sign, and it is far from one.
+fn middle(told: &[Option<f64>]) -> Option<f64> {
+    let telling = told.iter().flatten().count();
+    let asked: Vec<f64> = told.iter().flatten().copied().filter(|scale| *scale != 1.0).collect();
+    if asked.len() < 2 || 2 * asked.len() <= telling || asked.iter().any(|s| *s < 0.0) != asked.iter().all(|s| *s < 0.0)
+    {
+        return None;
+    }
+    let mut logs: Vec<f64> = asked.iter().map(|s| s.abs().ln()).collect();
+    let scale = asked[0].signum() * crate::robust::median(&mut logs)?.exp();
+    is_far(scale).then_some(scale)
+}
+
+/// Whether a scale is none that a robot could have.
+pub(crate) fn is_far(scale: f64) -> bool {
+    !(FAR.recip()..FAR).contains(&scale.abs())
 }
 
 /// One scale for all joints, where most of those that tell one ask for about the same. A wrist that bears little but friction
@@ -265,8 +299,12 @@ pub(crate) fn effort_unit(scale: f64, error: f64, limit: Option<f64>) -> Option<
         ("kN m", 1e-3),
         ("kgf m", 0.101972),
     ];
-    // All bodies together may be off by some per cent, which no log tells from a factor.
-    let near = |factor: f64| (scale.abs() / factor).ln().abs() < (2.5 * error).clamp(0.06, 0.08);
+    // All bodies together may be off by some per cent, which no log tells from a factor. Beside a thousand and a thousandth there
+    // is no other name.
+    let near = |factor: f64| {
+        let alone = [1e3, 1e-3].contains(&factor);
+        (scale.abs() / factor).ln().abs() < if alone { ALONE } else { (2.5 * error).clamp(0.06, 0.08) }
+    };
     let mut fitting: Vec<(String, f64)> =
         UNITS.iter().filter(|(_, factor)| near(*factor)).map(|(name, factor)| ((*name).to_owned(), *factor)).collect();
     if let Some(limit) = limit.filter(|limit| *limit > 0.0 && near(100.0 / limit)) {
@@ -295,6 +333,7 @@ mod tests {
                 effort: vec![effort],
                 log: vec![0; v.len()],
                 tents: vec![[0.0; 3]; v.len()],
+                silent: None,
             };
             friction_drives(&sample, &torque, 0)
         };

@@ -14,6 +14,7 @@ mod gravity;
 mod limits;
 mod motion;
 mod odd;
+mod odd_effort;
 mod order;
 mod sample;
 mod scale;
@@ -145,6 +146,11 @@ impl Fault {
     /// Whether nothing mends it but leaving out the effort of its joints.
     pub fn leaves_joints_out(&self) -> bool {
         self.changes.iter().any(|change| matches!(change, Change::NoEffort(_)))
+    }
+
+    /// The same as a question.
+    fn asked(self) -> Doubt {
+        Doubt { question: format!("{}?", self.evidence), joints: self.joints, effects: Vec::new() }
     }
 
     /// Whether it concerns a log of this name.

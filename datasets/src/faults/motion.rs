@@ -26,6 +26,9 @@ const OTHER_CLOCK: f64 = 0.2;
 /// A clock and a velocity agree where they differ by less than this, as a logarithm.
 const AGREES: f64 = 0.1;
 
+/// Part of a joint's torque that its motion takes at least, beside weight.
+const MOVES: f64 = 0.005;
+
 /// Places at which grids are looked at.
 const COARSE: usize = 60;
 /// What a gain far from one counts where a clock is looked for.
@@ -190,7 +193,7 @@ impl Scene<'_> {
             let named = position_units(prismatic(group[0]))
                 .into_iter()
                 .map(|(_, factor)| at(factor))
-                .filter(|named| (named.value / fine.value).ln().abs() < 0.06 && named.look < fine.look + 0.3)
+                .filter(|named| (named.value / fine.value).ln().abs() < 0.1 && named.look < fine.look + 0.3)
                 .min_by(|a, b| a.look.total_cmp(&b.look));
             best.push(named.unwrap_or(fine));
         }
@@ -257,7 +260,22 @@ impl Scene<'_> {
             .min_by(|a, b| a.look.total_cmp(&b.look));
         // A measured velocity that another clock would put right names that clock.
         let measured = self.velocity.map(f64::abs).filter(|slope| slope.ln().abs() > OTHER_CLOCK).map(at);
-        [Some(named.unwrap_or(fine)), measured].into_iter().flatten().collect()
+        let found = [Some(named.unwrap_or(fine)), measured].into_iter().flatten();
+        found.filter(|account| self.slow || self.moves_under(account.value)).collect()
+    }
+
+    /// Whether the motion takes torque beside weight by another clock: one that leaves none explains by leaving the motion out.
+    fn moves_under(&self, logged: f64) -> bool {
+        let mut sample = self.sample.clone();
+        apply(&Change::Clock(1.0 / logged), &mut sample);
+        let (torque, weight) = (sample.torque(self.model), sample.weight(self.model));
+        let part = |j: usize| {
+            let inertia: Vec<f64> = torque[j].iter().zip(&weight[j]).map(|(all, weight)| all - weight).collect();
+            crate::robust::rms(&inertia) / crate::robust::rms(&torque[j]).max(f64::MIN_POSITIVE)
+        };
+        (0..self.model.dof())
+            .filter(|&j| self.active[j] && weight[j].iter().any(|x| *x != 0.0))
+            .all(|j| part(j) > MOVES)
     }
 
     /// How far the gains of the joints lie from one on another clock: the median of their logarithms' sizes. Without gravity,

@@ -50,7 +50,15 @@ pub(crate) fn orders(model: &Model, sample: &Sample, active: &[bool]) -> Vec<(Ve
         let reversed = identity.iter().rev().copied().collect();
         let ends = [climb(identity.clone(), cost), climb(reversed, cost)];
         let best = ends.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
-        found.extend(best.filter(|order| *order != identity).map(|order| (order, channels)));
+        // Beside the best one the best pair: a climb by a first look goes on where noise leads it.
+        let pair = step(&mut identity.clone(), cost, cost(&identity)).map(|(_, (i, j))| {
+            let mut pair = identity.clone();
+            pair.swap(i, j);
+            pair
+        });
+        let pair = pair.filter(|pair| best.as_ref() != Some(pair));
+        let orders = best.into_iter().chain(pair).filter(|order| *order != identity);
+        found.extend(orders.map(|order| (order, channels.clone())));
     }
     found
 }
@@ -59,19 +67,25 @@ pub(crate) fn orders(model: &Model, sample: &Sample, active: &[bool]) -> Vec<(Ve
 fn climb(mut order: Vec<usize>, cost: &dyn Fn(&[usize]) -> f64) -> Vec<usize> {
     let mut least = cost(&order);
     for _ in 0..2 * order.len() {
-        let mut step = None;
-        for i in 0..order.len() {
-            for j in i + 1..order.len() {
-                order.swap(i, j);
-                let now = cost(&order);
-                if now < least - 1e-9 {
-                    (least, step) = (now, Some((i, j)));
-                }
-                order.swap(i, j);
-            }
-        }
-        let Some((i, j)) = step else { break };
+        let Some((now, (i, j))) = step(&mut order, cost, least) else { break };
+        least = now;
         order.swap(i, j);
     }
     order
+}
+
+/// The pair of joints to exchange for the least cost below `least`, with that cost.
+fn step(order: &mut [usize], cost: &dyn Fn(&[usize]) -> f64, least: f64) -> Option<(f64, (usize, usize))> {
+    let mut best: Option<(f64, (usize, usize))> = None;
+    for i in 0..order.len() {
+        for j in i + 1..order.len() {
+            order.swap(i, j);
+            let now = cost(order);
+            if now < best.map_or(least, |best| best.0) - 1e-9 {
+                best = Some((now, (i, j)));
+            }
+            order.swap(i, j);
+        }
+    }
+    best
 }

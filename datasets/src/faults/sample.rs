@@ -31,6 +31,8 @@ pub(crate) struct Sample {
     pub log: Vec<usize>,
     /// Beginning, middle and end of each tent, s.
     pub tents: Vec<[f64; 3]>,
+    /// A log whose effort has no say in a fit.
+    pub silent: Option<usize>,
 }
 
 impl Sample {
@@ -38,8 +40,15 @@ impl Sample {
     pub fn new(logs: &Logs) -> Sample {
         let n = logs.model.dof();
         let empty = || vec![Vec::new(); n];
-        let mut sample =
-            Sample { q: empty(), v: empty(), a: empty(), effort: empty(), log: Vec::new(), tents: Vec::new() };
+        let mut sample = Sample {
+            q: empty(),
+            v: empty(),
+            a: empty(),
+            effort: empty(),
+            log: Vec::new(),
+            tents: Vec::new(),
+            silent: None,
+        };
         let total: f64 = logs.episodes.iter().map(|episode| episode.duration()).sum();
         for (e, episode) in logs.episodes.iter().enumerate() {
             let width = window(logs, e);
@@ -64,17 +73,17 @@ impl Sample {
                 sample.tents.push(tent);
             }
         }
-        sample.effort = sample.effort_after(logs, 0.0);
+        sample.effort = sample.effort_after(logs, |_| 0.0);
         sample
     }
 
-    /// Mean effort under the tents, each moved `later` seconds.
-    pub fn effort_after(&self, logs: &Logs, later: f64) -> Vec<Vec<f64>> {
+    /// Mean effort under the tents, each moved `later(log)` seconds.
+    pub fn effort_after(&self, logs: &Logs, later: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
         let of = |j: usize| {
             let at = |(tent, &e): (&[f64; 3], &usize)| {
                 let episode = logs.episodes[e];
                 let beside = episode.disturbance.as_ref().map(|all| all[j].as_slice());
-                let tent = tent.map(|time| time + later);
+                let tent = tent.map(|time| time + later(e));
                 held_mean(&episode.time, &episode.effort[j], &tent)
                     + beside.map_or(0.0, |beside| held_mean(&episode.time, beside, &tent))
             };
@@ -93,6 +102,11 @@ impl Sample {
         self.kept(|k| k % stride == 0)
     }
 
+    /// The places in one log.
+    pub fn within(&self, log: usize) -> Sample {
+        self.kept(|k| self.log[k] == log)
+    }
+
     /// The places outside of one log.
     pub fn without(&self, log: usize) -> Sample {
         self.kept(|k| self.log[k] != log)
@@ -109,6 +123,7 @@ impl Sample {
             effort: table(&self.effort),
             log: (0..self.len()).filter(kept).map(|k| self.log[k]).collect(),
             tents: (0..self.len()).filter(kept).map(|k| self.tents[k]).collect(),
+            silent: self.silent,
         }
     }
 

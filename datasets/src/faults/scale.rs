@@ -30,7 +30,7 @@ pub(crate) fn scales(
     let n = model.dof();
     let plain = weigh(model, sample, &vec![1.0; n], active, Freedom::ORDINARY);
     let first = first_scales(model, sample, active);
-    let mut found = Vec::new();
+    let mut found: Vec<Result<Fault, Doubt>> = Vec::new();
     let mut taken = vec![1.0; n];
     if scales_cost(&first, active) > 0.0 {
         let (mut scales, mut best) = fine_scales(model, sample, first, active);
@@ -47,9 +47,15 @@ pub(crate) fn scales(
             // Of the sign friction is a witness too.
             let drives = scales[j] < 0.0 && friction_drives(sample, &torque, j);
             if alone_of(&scales, j) && !own && !impossible && !drives {
+                let (scale, with) = (scales[j], best.score);
                 scales[j] = 1.0;
                 (scales, best) = fine_scales(model, sample, scales, active);
                 cost = scales_cost(&scales, active);
+                let either = |score: f64| score.max(weigh_either(model, sample, &scales, active).score);
+                // A rotor that the description lacks makes a large scale; what makes a negative one is asked.
+                if !alone && scale < 0.0 && with - either(best.score) > 2.0 * SURE {
+                    found.push(Err(unwitnessed(&model.joints()[j].name)));
+                }
             }
         }
         // Joints that do as well as logged are as logged.
@@ -65,14 +71,12 @@ pub(crate) fn scales(
                 (scales, best, cost) = (without, other, other_cost);
             }
         }
-        // The nearest thing to a scale is a robot whose bodies are described badly; not all of them alike.
-        let shared = (0..n).filter(|&j| active[j]).all(|j| scales[j] != 1.0);
-        let margin = if shared && n > 1 {
-            best.score - cost - plain.score
-        } else {
-            let as_logged = weigh_either(model, sample, &vec![1.0; n], active);
-            weigh_either(model, sample, &scales, active).score - cost - as_logged.score
-        };
+        // The nearest thing to a scale is a robot whose bodies are described badly; not all of them alike, but for a tool that is
+        // described and not there. So one that all share must be the likelier robot, too.
+        let shared = (0..n).filter(|&j| active[j]).all(|j| scales[j] != 1.0) && n > 1;
+        let as_logged = weigh_either(model, sample, &vec![1.0; n], active);
+        let fair = weigh_either(model, sample, &scales, active).score - cost - as_logged.score;
+        let margin = if shared { best.score - cost - plain.score } else { fair };
         let mean = |of: &super::weigh::Weighed| {
             let scaled: Vec<f64> =
                 (0..n).filter(|&j| scales[j] != 1.0).map(|j| of.unexplained[j].min(1.0).ln()).collect();
@@ -87,7 +91,8 @@ pub(crate) fn scales(
         let asks = best.asked + 1.5 * SURE < plain.asked;
         let bent = asks && (shared || turned || size > 1.6);
         let explains = after < 0.45 && (after < less * before || bent);
-        if margin > if alone { 2.0 * SURE } else { SURE } && explains {
+        let sure = if alone { 2.0 * SURE } else { SURE };
+        if margin > sure && (!shared || fair > SURE) && explains {
             taken.clone_from(&scales);
             found.extend(said(logs, &scales, &best, &plain, (sample, &torque)));
         } else if margin > 0.5 * SURE && cost > 0.0 && (explains || asks && after < 0.45) && !alone {
@@ -106,6 +111,17 @@ pub(crate) fn scales(
     }
     found.extend(clipped(logs, model, sample, &taken, active).into_iter().map(Ok));
     found
+}
+
+/// What is asked of a joint that bears too little for its sign to be beyond doubt.
+fn unwitnessed(joint: &str) -> Doubt {
+    Doubt {
+        question: format!(
+            "is the effort of {joint} counted the other way round? The model then explains it far better"
+        ),
+        joints: vec![joint.to_owned()],
+        effects: Vec::new(),
+    }
 }
 
 /// Scales as faults: those that are alike as one, signs apart from sizes.

@@ -4,10 +4,10 @@ use super::change::Change;
 use super::decide::{Decision, SURE, left};
 use super::effort::{self, Useless};
 use super::sample::Sample;
-use super::shift::Bar;
+use super::shift::{Bar, Clocks};
 use super::units::CLOCKS;
 use super::weigh::{Freedom, Weighed, weigh};
-use super::{Doubt, Fault, FaultKind, Faults, channels, figure, odd, strange};
+use super::{Doubt, Fault, FaultKind, Faults, channels, figure, odd, odd_effort, strange};
 use crate::check::{Logs, Seen};
 use crate::episode::Episode;
 use gapscope_dynamics::Model;
@@ -15,7 +15,7 @@ use gapscope_dynamics::Model;
 /// Shifts below this are an effect, s: the border is 20 ms, and a lag of that looks like one a little longer.
 const SHIFT: f64 = 0.022;
 /// What the model says is wrong is beyond doubt where the mended logs leave less than this of the effort, squared.
-const SETTLED: f64 = 0.1;
+const SETTLED: f64 = 0.15;
 /// At most so many things are wrong with the motion.
 const ROUNDS: usize = 6;
 /// The logs while faults are taken out of them.
@@ -41,7 +41,10 @@ pub(crate) fn search(model: &Model, episodes: &[&Episode]) -> Faults {
     }
     let mut search =
         Search { model: model.clone(), episodes, faults: Vec::new(), doubts: Vec::new(), alone: false, seen: None };
+    search.slow_logs();
     search.channels();
+    search.shift_of_one();
+    search.odd_efforts();
     let (sample, active) = search.sampled();
     for odd in odd::odd_ones(model, &sample, &active) {
         if let Some(found) = search.apart(odd, &sample, &active) {
@@ -61,18 +64,21 @@ impl Search {
         self.motion();
         self.effort();
         self.shift(false);
-        if self.faults.len() > before && self.badly_described().is_some_and(|left| left.1 > SETTLED) {
+        let left = if self.faults.len() > before { self.badly_described().map_or(0.0, |left| left.1) } else { 0.0 };
+        if left > SETTLED {
             (self.model, self.episodes) = logged;
             self.seen = None;
-            // What is left out, and stamps in another unit, rest on the log more than on the model.
-            let (kept, asked): (Vec<Fault>, Vec<Fault>) =
-                self.faults.drain(before..).partition(|fault| fault.leaves_joints_out() || is_unit_of_time(fault));
+            // What is left out, and stamps in another unit, rest on the log more than on the model; and so does an effort that no
+            // robot like this has.
+            let far = |fault: &Fault| {
+                fault.kind == FaultKind::EffortScale && fault.factor.is_some_and(effort::is_far) && left < 2.0 * SETTLED
+            };
+            let (kept, asked): (Vec<Fault>, Vec<Fault>) = self
+                .faults
+                .drain(before..)
+                .partition(|fault| fault.leaves_joints_out() || is_unit_of_time(fault) || far(fault));
             kept.into_iter().for_each(|fault| self.take(fault));
-            self.doubts.extend(asked.into_iter().map(|fault| Doubt {
-                question: format!("{}?", fault.evidence),
-                joints: fault.joints,
-                effects: Vec::new(),
-            }));
+            self.doubts.extend(asked.into_iter().map(Fault::asked));
         }
         self.stranger();
         let velocities = self.with_logs(channels::velocities);
@@ -87,7 +93,7 @@ impl Search {
             part.dynamics();
             part
         };
-        let own = part(vec![self.episodes[odd].clone()], true);
+        let mut own = part(vec![self.episodes[odd].clone()], true);
         let of_robot = |fault: &Fault| fault.gravity.is_some();
         if own.faults.is_empty() || own.faults.iter().any(of_robot) {
             return None;
@@ -100,9 +106,19 @@ impl Search {
         if own.faults.iter().all(shared) {
             return None;
         }
-        // All logs as both leave them.
-        let mut mended = rest.episodes.clone();
-        mended.insert(odd, own.episodes[0].clone());
+        // All logs as both leave them. One log alone tells a unit less well than all together.
+        let with = |log: Episode| {
+            let mut mended = rest.episodes.clone();
+            mended.insert(odd, log);
+            mended
+        };
+        let score = |log: &Episode| {
+            let all = sampled(&rest.model, &with(log.clone()));
+            weigh(&rest.model, &all, &vec![1.0; active.len()], active, Freedom::ORDINARY).score
+        };
+        let logged = &self.episodes[odd];
+        odd::with_named_units(&rest.model, &mut own.faults, &mut own.episodes[0], logged, score);
+        let mended = with(own.episodes[0].clone());
         let after = sampled(&rest.model, &mended);
         if !odd::is_like_the_others(&rest.model, sample, &after, odd, active) {
             return None;
@@ -140,6 +156,21 @@ impl Search {
             self.model = self.model.clone().with_gravity(gravity.into());
         }
         self.faults.push(fault);
+    }
+
+    /// Stamps in another unit. Velocities are per true second.
+    fn slow_logs(&mut self) {
+        let mut found = self.with_logs(|logs| {
+            let of = |(e, factor): (usize, f64)| {
+                let unit = CLOCKS.iter().find(|(_, unit)| *unit == factor).map_or("", |(name, _)| *name);
+                let evidence = format!("time is in {unit}: from sample to sample it goes on by {}", figure(logs.dt[e]));
+                let undo = vec![Change::Clock(1.0 / factor)];
+                Fault::new(logs, FaultKind::TimeScale, &[], &[e], Some(factor), evidence, undo)
+            };
+            channels::slow_logs(logs).into_iter().map(of).collect()
+        });
+        merge(&mut found, self.episodes.len());
+        found.into_iter().for_each(|fault| self.take(fault));
     }
 
     /// Channels by themselves.
@@ -265,8 +296,13 @@ impl Search {
             }
             super::scale::scales(logs, logs.model, &sample, &active, alone)
         });
+        // What may be wrong with the motion of a joint may be what seems wrong with its effort.
+        let in_doubt: Vec<String> = self.doubts.iter().flat_map(|doubt| doubt.joints.clone()).collect();
         for found in found {
             match found {
+                Ok(fault) if fault.mended && fault.joints.iter().any(|joint| in_doubt.contains(joint)) => {
+                    self.doubts.push(fault.asked());
+                }
                 Ok(fault) => self.take(fault),
                 Err(doubt) => self.doubts.push(doubt),
             }
@@ -299,22 +335,40 @@ impl Search {
 
     /// Effort and position of different instants.
     fn shift(&mut self, nothing_else: bool) {
-        let alone = self.alone;
-        let bar = Bar { least: SHIFT, sure: if alone { 2.0 * SURE } else { SURE }, nothing_else };
-        let found = self.with_logs(|logs| {
-            let active = Self::active(logs);
-            let sample = Sample::new(logs);
-            if sample.len() < 30 || !active.contains(&true) {
-                return None;
-            }
-            super::shift::shift(logs, logs.model, &sample, &active, bar)
-        });
-        match found {
+        let bar = Bar { least: SHIFT, sure: if self.alone { 2.0 * SURE } else { SURE }, nothing_else };
+        match self.clocks(|clocks| clocks.shift(bar)) {
             Some(Ok(fault)) => self.take(fault),
             // Where something is asked already, a shift may be what that does.
             Some(Err(doubt)) if self.doubts.is_empty() => self.doubts.push(doubt),
             _ => {}
         }
+    }
+
+    /// One log of several whose effort and position are of different instants.
+    fn shift_of_one(&mut self) {
+        let bar = Bar { least: SHIFT, sure: 2.0 * SURE, nothing_else: false };
+        let found = self.clocks(|clocks| clocks.shift_of_one(bar));
+        found.into_iter().for_each(|fault| self.take(fault));
+    }
+
+    /// Efforts of one log of several that are not like those of the others.
+    fn odd_efforts(&mut self) {
+        let found = self.with_logs(|logs| {
+            let (active, sample) = (Self::active(logs), Sample::new(logs));
+            odd_effort::odd_efforts(logs, logs.model, &sample, &active)
+        });
+        found.into_iter().for_each(|fault| self.take(fault));
+    }
+
+    fn clocks<T>(&mut self, f: impl FnOnce(Clocks) -> Option<T>) -> Option<T> {
+        self.with_logs(|logs| {
+            let active = Self::active(logs);
+            let sample = Sample::new(logs);
+            if sample.len() < 30 || !active.contains(&true) {
+                return None;
+            }
+            f(Clocks { logs, model: logs.model, sample: &sample, active: &active })
+        })
     }
 }
 

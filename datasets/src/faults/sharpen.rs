@@ -15,6 +15,8 @@ use std::f64::consts::FRAC_PI_2;
 const NAMED: f64 = 12.0;
 /// And further nats for each joint: a sixth more of its effort, squared, where no account leaves nothing.
 const PER_JOINT: f64 = 9.0;
+/// A factor is near a unit with a name where it differs by less than this, as a logarithm.
+const NEAR: f64 = 0.05;
 /// A unit with a name that limits ask for is that unit within a factor of two.
 const UNTOLD: f64 = std::f64::consts::LN_2;
 
@@ -101,7 +103,7 @@ impl Decision<'_> {
             Kind::Clock => 0.15,
             // Limits tell that there is a unit, friction and rotors hardly which.
             _ if account.inside > 0 => UNTOLD,
-            _ => 0.05,
+            _ => NEAR,
         };
         let most = NAMED + PER_JOINT * active.iter().filter(|active| **active).count() as f64;
         let off = |value: f64| if add { (value - best.1.value).abs() } else { (value / best.1.value).ln().abs() };
@@ -110,7 +112,11 @@ impl Decision<'_> {
         let met = |(score, account): &(f64, Account)| {
             score + if account.kind == Kind::Scale && account.value == 1f64.to_degrees() { NAMED } else { 0.0 }
         };
-        if let Some(named) = named.max_by(|a, b| met(a).total_cmp(&met(b))).filter(|named| named.0 > best.0 - most) {
+        // Far from where the fit has it, a unit that limits ask for is one only where the fit hardly tells.
+        let close = if account.inside > 0 { NEAR } else { reach };
+        let least = |value: f64| best.0 - if off(value) < close { most } else { NAMED };
+        let named = named.filter(|(score, account)| *score > least(account.value));
+        if let Some(named) = named.max_by(|a, b| met(a).total_cmp(&met(b))) {
             return named.1;
         }
         let measured = match account.kind {

@@ -1,8 +1,9 @@
 //! Channels that do not belong to the same instant: how late the effort comes behind the motion that it makes.
 
 use super::change::Change;
+use super::odd::MOST_LOGS;
 use super::sample::Sample;
-use super::weigh::{Freedom, weigh};
+use super::weigh::{Freedom, Weighed, spread, weigh};
 use super::{Doubt, Fault, FaultKind, figure};
 use crate::check::{Logs, fit};
 use gapscope_dynamics::Model;
@@ -11,6 +12,12 @@ use gapscope_dynamics::Model;
 const LONGEST: f64 = 0.5;
 /// Steps by which a shift is brought to its greatest likelihood, each half as wide where the last led nowhere.
 const STEPS: usize = 12;
+/// Where half of several logs tell a shift by themselves, and all gain by it, it may leave this part of what was left: bristles and play are told by
+/// the motion, and so are not the same in all.
+const AGREED: f64 = 0.7;
+const FEW_LOGS: usize = 3;
+/// Fewer places tell nothing.
+const FEWEST: usize = 30;
 /// Where an account leaves less than this of every joint's effort, squared, no shift is looked for.
 const LITTLE: f64 = 2e-3;
 /// An unexplained share below this counts as this.
@@ -20,9 +27,15 @@ const FLOOR: f64 = 1e-3;
 /// that must have been left. Bristles and play look like a shift that takes two thirds of what is left.
 const TOGETHER: (f64, f64, f64) = (0.25, 0.3, 0.003);
 
-/// A shift that leaves up to twice that part is asked where it is so many times the shortest: bristles and play look like
-/// short ones.
-const LONG: f64 = 2.0;
+/// A shift that leaves up to this many times that part is asked.
+const ASKED: f64 = 2.0;
+/// The first look tells a shift where all joints together leave less by this, nats.
+const TOLD: f64 = 0.7;
+/// A log gains by a shift where it is left with so much less, nats. One log is late by itself where no other gains by its
+/// shift, ...
+const OTHERS: f64 = 0.2;
+/// ... and where it is left with this part of what it left at most: what looks like a shift in one log does in all.
+const ONE: f64 = 0.45;
 
 /// What is asked of a shift.
 #[derive(Debug, Clone, Copy)]
@@ -35,98 +48,186 @@ pub(crate) struct Bar {
     pub nothing_else: bool,
 }
 
-/// A shift of all joints that leaves no doubt. Of one joint by itself it is hardly ever one: topics are merged as wholes.
-pub(crate) fn shift(
-    logs: &Logs,
-    model: &Model,
-    sample: &Sample,
-    active: &[bool],
-    bar: Bar,
-) -> Option<Result<Fault, Doubt>> {
-    let n = model.dof();
-    let ones = vec![1.0; n];
-    let weighed = |sample: &Sample, freedom: Freedom| weigh(model, sample, &ones, active, freedom);
-    let before = weighed(sample, Freedom::ORDINARY);
-    if (0..n).all(|j| !active[j] || before.unexplained[j] < LITTLE) {
-        return None;
+/// What a shift is looked for in.
+pub(crate) struct Clocks<'a> {
+    pub logs: &'a Logs<'a>,
+    pub model: &'a Model,
+    pub sample: &'a Sample,
+    /// Joints whose effort says something.
+    pub active: &'a [bool],
+}
+
+impl Clocks<'_> {
+    /// A shift of all joints that leaves no doubt. Of one joint by itself it is hardly ever one: topics are merged as wholes.
+    pub fn shift(&self, bar: Bar) -> Option<Result<Fault, Doubt>> {
+        let before = self.weighed(self.sample, Freedom::ORDINARY);
+        if self.group().all(|j| before.unexplained[j] < LITTLE) {
+            return None;
+        }
+        let (best, _) = self.first(self.sample, bar)?;
+        let best = self.refined(best, bar, |_| true)?;
+        let after = self.weighed(&self.moved(|_| best), Freedom::ORDINARY);
+        let (part, most, least_left) = TOGETHER;
+        let (left, now) = (self.share(&before), self.share(&after));
+        if bar.nothing_else && !after.is_plain(self.active) {
+            return None;
+        }
+        if after.score - before.score < bar.sure || left < least_left {
+            return None;
+        }
+        let clear = now <= part * left && now <= most || self.agreed(best, bar) && now <= AGREED * left;
+        if !clear && (bar.nothing_else || now > ASKED * part * left || now > most) {
+            return None;
+        }
+        let files: Vec<usize> = (0..self.logs.episodes.len()).collect();
+        let fault = self.fault(best, &files, (left, now));
+        Some(if clear { Ok(fault) } else { Err(fault.asked()) })
     }
-    let torque = sample.torque(model);
-    let shortest = logs.episodes.iter().map(|episode| episode.duration()).fold(f64::INFINITY, f64::min);
-    let longest = LONGEST.min(shortest / 8.0);
-    let step = (bar.least / 3.0).max(logs.dt.iter().copied().fold(0.0, f64::max));
-    let steps = (longest / step) as i32;
-    let group: Vec<usize> = (0..n).filter(|&j| active[j]).collect();
-    let left_at = |later: f64| -> f64 {
-        let effort = sample.effort_after(logs, later);
-        let left = |j: &usize| {
-            fit(&effort[*j], &torque[*j], &sample.v[*j], None).map_or(1.0, |fit| fit.unexplained).max(FLOOR).ln()
+
+    /// A shift of one log of several, where the others have none like it.
+    pub fn shift_of_one(&self, bar: Bar) -> Option<Fault> {
+        let count = self.logs.episodes.len();
+        if !(2..=MOST_LOGS).contains(&count) {
+            return None;
+        }
+        let parts: Vec<Sample> = (0..count).map(|e| self.sample.within(e)).collect();
+        let enough = |e: &usize| parts[*e].len() >= FEWEST;
+        let told = |e: usize| self.first(&parts[e], bar).map(|(best, gained)| (e, best, gained));
+        let (odd, best, _) = (0..count).filter(enough).filter_map(told).max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let others = (0..count).filter(|e| *e != odd).filter(enough);
+        if others.clone().next().is_none() || others.into_iter().any(|e| self.gained(&parts[e], best) > OTHERS) {
+            return None;
+        }
+        let best = self.refined(best, bar, |e| e == odd)?;
+        let late = |e: usize| if e == odd { best } else { 0.0 };
+        let [before, after] = [self.sample.clone(), self.moved(late)].map(|all| self.weighed(&all, Freedom::ORDINARY));
+        // What the robot that all logs make leaves of this one.
+        let left = |of: &Weighed, effort: &[Vec<f64>]| self.left_in(of, effort, odd);
+        let (left, now) = (left(&before, &self.sample.effort), left(&after, &self.moved(late).effort));
+        let sure = after.score - before.score > bar.sure && now < ONE * left;
+        sure.then(|| self.fault(best, &[odd], (left, now)))
+    }
+
+    /// Whether several logs by themselves tell this shift, and all gain by it.
+    fn agreed(&self, best: f64, bar: Bar) -> bool {
+        let count = self.logs.episodes.len();
+        if !(FEW_LOGS..=MOST_LOGS).contains(&count) {
+            return false;
+        }
+        let parts: Vec<Sample> = (0..count).map(|e| self.sample.within(e)).collect();
+        let tells = |part: &&Sample| {
+            let told = self.first(part, bar);
+            told.is_some_and(|(own, _)| (own - best).abs() < (0.25 * best.abs()).max(bar.least))
         };
-        group.iter().map(left).sum()
-    };
-    let table = (-steps..=steps).map(|i| f64::from(i) * step).map(|later| (left_at(later), later));
-    let (mut lowest, mut best) = table.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let mut width = 0.5 * step;
-    for _ in 0..7 {
-        for other in [best - width, best + width] {
-            let now = left_at(other);
-            if now < lowest {
-                (best, lowest) = (other, now);
+        2 * parts.iter().filter(tells).count() >= count && parts.iter().all(|part| self.gained(part, best) > OTHERS)
+    }
+
+    fn group(&self) -> impl Iterator<Item = usize> {
+        (0..self.model.dof()).filter(|&j| self.active[j])
+    }
+
+    fn weighed(&self, sample: &Sample, freedom: Freedom) -> Weighed {
+        weigh(self.model, sample, &vec![1.0; self.model.dof()], self.active, freedom)
+    }
+
+    /// The longest shift that is looked for, and the step of the first look, s.
+    fn range(&self, bar: Bar) -> (f64, f64) {
+        let shortest = self.logs.episodes.iter().map(|episode| episode.duration()).fold(f64::INFINITY, f64::min);
+        (LONGEST.min(shortest / 8.0), (bar.least / 3.0).max(self.logs.dt.iter().copied().fold(0.0, f64::max)))
+    }
+
+    /// What a first look leaves of the effort that comes so much later, whatever the gain of each joint: a sum of logarithms.
+    fn left_at(&self, sample: &Sample, torque: &[Vec<f64>], later: f64) -> f64 {
+        let effort = sample.effort_after(self.logs, |_| later);
+        let left = |j: usize| {
+            fit(&effort[j], &torque[j], &sample.v[j], None).map_or(1.0, |fit| fit.unexplained).max(FLOOR).ln()
+        };
+        self.group().map(left).sum()
+    }
+
+    /// What a first look gains by a shift, nats.
+    fn gained(&self, sample: &Sample, later: f64) -> f64 {
+        let torque = sample.torque(self.model);
+        self.left_at(sample, &torque, 0.0) - self.left_at(sample, &torque, later)
+    }
+
+    /// The shift that a first look tells, and what it gains.
+    fn first(&self, sample: &Sample, bar: Bar) -> Option<(f64, f64)> {
+        let torque = sample.torque(self.model);
+        let (longest, step) = self.range(bar);
+        let steps = (longest / step) as i32;
+        let left_at = |later: f64| self.left_at(sample, &torque, later);
+        let table = (-steps..=steps).map(|i| f64::from(i) * step).map(|later| (left_at(later), later));
+        let (mut lowest, mut best) = table.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let mut width = 0.5 * step;
+        for _ in 0..7 {
+            for other in [best - width, best + width] {
+                let now = left_at(other);
+                if now < lowest {
+                    (best, lowest) = (other, now);
+                }
+            }
+            width *= 0.5;
+        }
+        let gained = left_at(0.0) - lowest;
+        (best.abs() >= bar.least && gained >= TOLD && best.abs() <= 0.97 * longest).then_some((best, gained))
+    }
+
+    /// The shift of some logs at its greatest likelihood. The first look lets friction be anything, which moves a shift; a robot's
+    /// own friction does not.
+    fn refined(&self, best: f64, bar: Bar, of: impl Fn(usize) -> bool) -> Option<f64> {
+        let (longest, step) = self.range(bar);
+        let at = |later: f64| {
+            let moved = self.moved(|e| if of(e) { later } else { 0.0 });
+            (later, self.weighed(&moved, Freedom::FINE).score)
+        };
+        let (mut now, mut width) = (at(best), 2.0 * step);
+        for _ in 0..STEPS {
+            let around = [at(now.0 - width), at(now.0 + width)];
+            match around.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+                Some(better) if better.1 > now.1 => now = better,
+                _ => width *= 0.5,
             }
         }
-        width *= 0.5;
+        (now.0.abs() >= bar.least && now.0.abs() <= 0.97 * longest).then_some(now.0)
     }
-    let gained = left_at(0.0) - lowest;
-    if best.abs() < bar.least || gained < 0.7 || best.abs() > 0.97 * longest {
-        return None;
-    }
-    let moved = |later: f64| {
-        let mut moved = sample.clone();
-        let effort = sample.effort_after(logs, later);
-        group.iter().for_each(|&j| moved.effort[j].clone_from(&effort[j]));
+
+    /// The sample with efforts so much later in each log.
+    fn moved(&self, later: impl Fn(usize) -> f64) -> Sample {
+        let mut moved = self.sample.clone();
+        let effort = self.sample.effort_after(self.logs, later);
+        self.group().for_each(|j| moved.effort[j].clone_from(&effort[j]));
         moved
-    };
-    let at = |later: f64| (later, weighed(&moved(later), Freedom::FINE).score);
-    // The first look lets friction be anything, which moves a shift; a robot's own friction does not.
-    let (mut now, mut width) = (at(best), 2.0 * step);
-    for _ in 0..STEPS {
-        let around = [at(now.0 - width), at(now.0 + width)];
-        match around.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
-            Some(better) if better.1 > now.1 => now = better,
-            _ => width *= 0.5,
-        }
     }
-    let best = now.0;
-    let after = weighed(&moved(best), Freedom::ORDINARY);
-    if best.abs() < bar.least || best.abs() > 0.97 * longest {
-        return None;
+
+    /// What is left of the effort, squared, in the geometric mean over the joints.
+    fn share(&self, found: &Weighed) -> f64 {
+        let logs: Vec<f64> = self.group().map(|j| found.unexplained[j].ln()).collect();
+        (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
     }
-    let share = |found: &super::weigh::Weighed| {
-        (group.iter().map(|&j| found.unexplained[j].ln()).sum::<f64>() / group.len() as f64).exp()
-    };
-    let (part, most, least_left) = TOGETHER;
-    let (left, now) = (share(&before), share(&after));
-    if bar.nothing_else && !after.is_plain(active) {
-        return None;
+
+    /// The same in one log.
+    fn left_in(&self, found: &Weighed, effort: &[Vec<f64>], log: usize) -> f64 {
+        let places: Vec<usize> = (0..self.sample.len()).filter(|&k| self.sample.log[k] == log).collect();
+        let left = |j: usize| {
+            let off: f64 = places.iter().map(|&k| (effort[j][k] - found.predicted[j][k]).powi(2)).sum();
+            let all: Vec<f64> = places.iter().map(|&k| effort[j][k]).collect();
+            (off / places.len().max(1) as f64 / spread(&all).max(1e-300)).max(FLOOR).ln()
+        };
+        let logs: Vec<f64> = self.group().map(left).collect();
+        (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
     }
-    if after.score - before.score < bar.sure || now > most || left < least_left {
-        return None;
+
+    fn fault(&self, best: f64, files: &[usize], (left, now): (f64, f64)) -> Fault {
+        let (late, side) = if best > 0.0 { (best, "later") } else { (-best, "earlier") };
+        let evidence = format!(
+            "the effort comes {} ms {side} than the motion that it makes: the model then leaves {} % of it, squared, not {} %",
+            figure(1e3 * late),
+            figure(100.0 * now),
+            figure(100.0 * left)
+        );
+        let group: Vec<usize> = self.group().collect();
+        let changes = group.iter().map(|&j| Change::Late(j, best)).collect();
+        Fault::new(self.logs, FaultKind::TimeShift, &group, files, Some(best), evidence, changes)
     }
-    let clear = now <= part * left;
-    if !clear && (bar.nothing_else || now > 2.0 * part * left || best.abs() < LONG * bar.least) {
-        return None;
-    }
-    let (late, side) = if best > 0.0 { (best, "later") } else { (-best, "earlier") };
-    let evidence = format!(
-        "the effort comes {} ms {side} than the motion that it makes: the model then leaves {} % of it, squared, not {} %",
-        figure(1e3 * late),
-        figure(100.0 * now),
-        figure(100.0 * left)
-    );
-    if !clear {
-        let joints = group.iter().map(|&j| model.joints()[j].name.clone()).collect();
-        return Some(Err(Doubt { question: format!("{evidence}?"), joints, effects: Vec::new() }));
-    }
-    let changes = group.iter().map(|&j| Change::Late(j, best)).collect();
-    let files: Vec<usize> = (0..logs.episodes.len()).collect();
-    Some(Ok(Fault::new(logs, FaultKind::TimeShift, &group, &files, Some(best), evidence, changes)))
 }

@@ -14,6 +14,8 @@ const STRONG: f64 = 2.0;
 /// A robot whose mass is outside of these parts of the described one may be another, or be logged in other units: its links are
 /// off by a third at most, and it carries no more than that.
 const MASS: (f64, f64) = (0.62, 1.6);
+/// And so may one whose motion takes less or more than this of the described torque: rotors, springs and a payload are in it.
+const TORQUE: (f64, f64) = (0.45, 2.5);
 /// Logs tell nothing of a gain of which they leave this part of the spread that used robots have.
 const UNTOLD: f64 = 0.9;
 
@@ -28,6 +30,12 @@ pub(super) fn question(logs: &Logs, weighed: &Weighed, left: f64, active: &[bool
         format!(
             "are effort, position and time in N m (N), rad (m) and s? They ask for a robot of {} times the mass that the description has",
             figure(weighed.mass)
+        )
+    } else if !(TORQUE.0..TORQUE.1).contains(&weighed.torque) {
+        // The mass of a link that hardly moves anything tells nothing.
+        format!(
+            "are effort, position and time in N m (N), rad (m) and s, and is the description in kg and m? The motion asks for {} times the torque that the description takes",
+            figure(weighed.torque)
         )
     } else if let Some((j, times)) = unwitnessed(weighed, active) {
         let joint = &logs.model.joints()[j].name;

@@ -12,6 +12,10 @@ const FLOOR: f64 = 3e-4;
 const MOST_INDEPENDENT: f64 = 120.0;
 /// What it costs, in nats, to take a robot for one that has been used long.
 const WORN: f64 = 3.0;
+/// A robot described in grams is one whose efforts are this part of what the description takes, ...
+const GRAMS: f64 = 1e-3;
+/// ... within this, as a logarithm.
+const NEAR: f64 = 0.7;
 /// Rounds of weighing the joints against each other.
 const ROUNDS: usize = 4;
 /// Columns of each joint: bias, viscous and dry friction, rotor, gain.
@@ -58,6 +62,8 @@ pub(crate) struct Weighed {
     pub mass: f64,
     /// Effort that each joint's own motion asks for beside friction and bias, over what the description takes for it.
     pub inertia: Vec<f64>,
+    /// The same of all joints together: the heaviest count most.
+    pub torque: f64,
     /// What it makes of the effort, joint-major, N m or N.
     pub predicted: Vec<Vec<f64>>,
 }
@@ -86,13 +92,15 @@ pub(crate) fn weigh_either(model: &Model, sample: &Sample, scale: &[f64], active
 /// `active` have no say.
 pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[bool], freedom: Freedom) -> Weighed {
     let n = model.dof();
-    let places = sample.len();
+    // Places of a silent log have a prediction and no say.
+    let heard: Vec<usize> = (0..sample.len()).filter(|&k| sample.silent != Some(sample.log[k])).collect();
+    let places = heard.len();
     let width = 10 * n + OWN * n;
     let torque = sample.torque(model);
     let target: Vec<Vec<f64>> =
         (0..n).map(|j| sample.effort[j].iter().map(|effort| effort / scale[j]).collect()).collect();
     let most = torque.iter().map(|row| rms(row)).fold(0.0, f64::max);
-    let level: Vec<f64> = (0..n).map(|j| level(model, j, &torque[j], most)).collect();
+    let level: Vec<f64> = (0..n).map(|j| level(model, j, &torque[j], most, scale[j])).collect();
     let slow: Vec<f64> = sample.v.iter().map(|v| 0.1 * rms(v)).collect();
     let columns = |j: usize, k: usize, row: &mut [f64]| {
         let v = sample.v[j][k];
@@ -106,8 +114,8 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
     let mut bodies = DMatrix::zeros(n, 10 * n);
     let mut data = Data::new(model);
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    let mut rows = vec![vec![0.0; width * places]; n];
-    for k in 0..places {
+    let mut rows = vec![vec![0.0; width * sample.len()]; n];
+    for k in 0..sample.len() {
         for j in 0..n {
             (q[j], v[j], a[j]) = (sample.q[j][k], sample.v[j][k], sample.a[j][k]);
         }
@@ -119,15 +127,16 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
         }
     }
     for j in (0..n).filter(|&j| active[j]) {
-        let table = DMatrix::from_column_slice(width, places, &rows[j]);
-        let left = DVector::from_iterator(places, target[j].iter().zip(&torque[j]).map(|(y, tau)| y - tau));
+        let column = |&k: &usize| rows[j][width * k..][..width].iter().copied();
+        let table = DMatrix::from_iterator(width, places, heard.iter().flat_map(column));
+        let left = DVector::from_iterator(places, heard.iter().map(|&k| target[j][k] - torque[j][k]));
         normal[j] = &table * table.transpose();
         right[j] = &table * &left;
         squares[j] = left.norm_squared();
     }
     let mut prior = prior(model, sample, &level, freedom);
     let ordinary = prior.clone();
-    let variance: Vec<f64> = target.iter().map(|y| spread(y)).collect();
+    let variance: Vec<f64> = target.iter().map(|y| spread(&heard.iter().map(|&k| y[k]).collect::<Vec<_>>())).collect();
     let independent = (0.5 * places as f64).min(MOST_INDEPENDENT);
     // Rows count as fewer where they are not independent.
     let worth = independent / places.max(1) as f64;
@@ -169,7 +178,7 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
             let row = &rows[j][width * k..][..width];
             torque[j][k] + row.iter().zip(solution.iter()).map(|(x, p)| x * p).sum::<f64>()
         };
-        (0..places).map(at).collect()
+        (0..sample.len()).map(at).collect()
     });
     // Without what friction and bias take: the first three of the joint's own columns.
     let inertia = |j: usize| {
@@ -180,8 +189,11 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
             let further: f64 = further.filter(|(i, _)| !friction.contains(i)).map(|(_, (x, p))| x * p).sum();
             (sum, size) = (sum + (torque + further) * torque, size + torque * torque);
         }
-        if active[j] && size > 0.0 { sum / size } else { 1.0 }
+        if active[j] && size > 0.0 { (sum, size) } else { (1.0, 1.0) }
     };
+    let inertia: Vec<(f64, f64)> = (0..n).map(inertia).collect();
+    let (sum, size) =
+        (0..n).filter(|&j| active[j]).fold((0.0, 0.0), |all, j| (all.0 + inertia[j].0, all.1 + inertia[j].1));
     let described: f64 = model.joints().iter().map(|joint| joint.inertia.mass.abs()).sum();
     let further: f64 = (0..n).map(|j| solution[10 * j]).sum();
     let gains: Vec<f64> = (0..n).filter(|&j| active[j]).map(|j| 1.0 + solution[gain_at(j)]).collect();
@@ -189,7 +201,8 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
     Weighed {
         score: likelihood - asked,
         mass: (1.0 + further / described.max(1e-9)) * mean_gain,
-        inertia: (0..n).map(inertia).collect(),
+        inertia: inertia.iter().map(|(sum, size)| sum / size).collect(),
+        torque: if size > 0.0 { sum / size } else { 1.0 },
         asked,
         unexplained,
         gain: (0..n).map(|j| 1.0 + solution[gain_at(j)]).collect(),
@@ -219,8 +232,11 @@ fn keep_to_physics(model: &Model, solution: &DVector<f64>, ordinary: &[f64], pri
 
 /// What is much torque for a joint: its limit, or the torque that the motion takes. `most` is what it takes of the joint that
 /// bears most.
-fn level(model: &Model, j: usize, torque: &[f64], most: f64) -> f64 {
+///
+/// A thousandth of the effort is a description in grams, and its limits are in N m (N) all the same.
+fn level(model: &Model, j: usize, torque: &[f64], most: f64, scale: f64) -> f64 {
     let limit = model.joints()[j].limits.effort.filter(|limit| *limit > 0.0 && limit.is_finite()).unwrap_or(0.0);
+    let limit = if (scale.abs() / GRAMS).ln().abs() < NEAR { limit / GRAMS } else { limit };
     // A limit far beyond what the motion takes is that of another drive, or none. A wrist that bears next to nothing has the
     // friction of its drive all the same.
     let taken = rms(torque);

@@ -302,3 +302,51 @@ fn efforts_that_one_log_cuts_off_are_told_and_left_out() {
     assert_eq!((fault.kind, &fault.joints), (FaultKind::EffortClipped, &names(&model, &[1])));
     assert!(fault.files == ["run_1.csv"] && !fault.mended, "{fault:#?}");
 }
+
+/// The description with masses and inertias in grams.
+fn in_grams(urdf: &str) -> String {
+    let mut text = String::new();
+    let mut rest = urdf;
+    let names = ["mass value=\"", "ixx=\"", "ixy=\"", "ixz=\"", "iyy=\"", "iyz=\"", "izz=\""];
+    while let Some(from) = names.iter().filter_map(|name| rest.find(name).map(|at| at + name.len())).min() {
+        let end = from + rest[from..].find('"').unwrap();
+        let number: f64 = rest[from..end].parse().unwrap();
+        text += &format!("{}{}", &rest[..from], 1e3 * number);
+        rest = &rest[end..];
+    }
+    text + rest
+}
+
+#[test]
+fn a_description_in_grams_is_said_though_its_limits_are_not() {
+    for name in ["arm6", "arm7"] {
+        let model = built_in(name);
+        let logs = logs(&model, 2, 2);
+        let heavy = Model::from_urdf(&in_grams(gapscope_dynamics::robots::urdf(name).unwrap())).unwrap().model;
+        let all = names(&model, &(0..model.dof()).collect::<Vec<_>>());
+        let fault = only(&find_faults(&heavy, &logs), FaultKind::EffortScale, all, Some(1e-3));
+        assert!(fault.evidence.contains("grams"), "{fault:#?}");
+    }
+}
+
+#[test]
+fn one_log_whose_effort_is_late_is_named() {
+    let model = built_in("arm6");
+    let mut logs = logs(&model, 5, 3);
+    logs[1].effort.iter_mut().for_each(|x| x.rotate_right(25));
+    let faults = find_faults(&model, &logs);
+    let [fault] = faults.faults.as_slice() else { panic!("{faults:#?}") };
+    assert_eq!((fault.kind, fault.files.as_slice()), (FaultKind::TimeShift, &["run_1.csv".to_owned()][..]));
+    assert!((fault.factor.unwrap() - 0.1).abs() < 0.01, "{fault:#?}");
+}
+
+#[test]
+fn stamps_of_one_log_in_another_unit_are_named() {
+    let model = built_in("double_pendulum");
+    let mut logs = logs(&model, 5, 3);
+    times(&mut logs[2].time, 1e9);
+    let faults = find_faults(&model, &logs);
+    let [fault] = faults.faults.as_slice() else { panic!("{faults:#?}") };
+    assert_eq!((fault.kind, fault.factor), (FaultKind::TimeScale, Some(1e9)));
+    assert_eq!(fault.files, ["run_2.csv"]);
+}

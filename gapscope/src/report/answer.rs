@@ -224,6 +224,9 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
                 percent(diagnosis.unexplained.fraction)
             )
         }
+        _ if super::plain::is_too_short(diagnosis) => {
+            "There is a gap, and the logs are too short to decide what causes it.".into()
+        }
         other => words::verdict_meaning(other).into(),
     }
 }

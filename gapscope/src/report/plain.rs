@@ -3,13 +3,15 @@
 //! The terminal and the page begin with these very words.
 
 use super::answer::largest;
-use super::format::{count, figure, percent, with_unit};
+use super::format::{count, figure, percent, plain, with_unit};
 use super::{clause, words};
 use gapscope_datasets::Fault;
 use gapscope_diagnosis::schema::{Combination, Diagnosis, FoundEffect, Verdict};
 
 /// Effects that the first sentence names beside the strongest.
 const FURTHER: usize = 2;
+/// Logs shorter than this in all, s, do not show every effect: of a real double pendulum 5 s show nothing, 20 s its friction.
+const SHORT: f64 = 8.0;
 /// A change of the gap by less than this part is none.
 const SAME: f64 = 0.01;
 
@@ -23,6 +25,9 @@ fn cause(diagnosis: &Diagnosis) -> String {
     let said = match diagnosis.verdict {
         Verdict::NoGap => "Model and robot agree: these logs need no effect that the model lacks.".into(),
         Verdict::NotExcited => "The robot moves too little in these logs to tell what the model lacks.".into(),
+        _ if is_too_short(diagnosis) => {
+            format!("The model lacks something, and {} s are too short to decide what.", plain(diagnosis.data.duration))
+        }
         _ if diagnosis.effects.is_empty() => "The model lacks something, and it is no effect that I know.".into(),
         Verdict::UnknownEffect => format!("{} Something else is at work that I do not know.", named()),
         _ => named(),
@@ -46,6 +51,11 @@ pub fn effects(list: &[FoundEffect], all: &[String], sums: &[Combination]) -> St
     }
     let also = if named.is_empty() { String::new() } else { format!(" Beside it: {}.", words::list(&named, "and")) };
     format!("{}.{also}", clause::of(first, all, sums))
+}
+
+/// Whether no effect was found in logs that are too short to find one: that every effect was tried then says nothing.
+pub fn is_too_short(diagnosis: &Diagnosis) -> bool {
+    diagnosis.verdict == Verdict::UnknownEffect && diagnosis.effects.is_empty() && diagnosis.data.duration < SHORT
 }
 
 /// The effects as they are read: links that differ are one thing, as their torques are, of which the logs tell the sums.
@@ -182,6 +192,18 @@ mod tests {
                 assert!(longest.unwrap_or(0) <= 25, "{name}: {line}");
             }
         }
+    }
+
+    #[test]
+    fn of_short_logs_without_an_effect_the_length_is_the_cause() {
+        let (_, mut diagnosis, _) = sample::explained();
+        diagnosis.effects.clear();
+        diagnosis.verdict = Verdict::UnknownEffect;
+        let first = |diagnosis: &Diagnosis| answer(diagnosis)[0].clone();
+        diagnosis.data.duration = SHORT + 0.1;
+        assert!(first(&diagnosis).contains("no effect that I know"));
+        diagnosis.data.duration = SHORT - 0.1;
+        assert!(first(&diagnosis).contains("too short to decide"), "{}", first(&diagnosis));
     }
 
     #[test]

@@ -92,7 +92,7 @@ pub(crate) fn scales(
         let bent = asks && (shared || turned || size > 1.6);
         let explains = after < 0.45 && (after < less * before || bent);
         let sure = if alone { 2.0 * SURE } else { SURE };
-        if margin > sure && (!shared || fair > SURE) && explains {
+        if margin > sure && (!shared || fair > 0.0) && explains {
             taken.clone_from(&scales);
             found.extend(said(logs, &scales, &best, &plain, (sample, &torque)));
         } else if margin > 0.5 * SURE && cost > 0.0 && (explains || asks && after < 0.45) && !alone {

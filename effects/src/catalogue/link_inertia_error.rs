@@ -134,7 +134,7 @@ fn scales(model: &Model, joint: usize) -> Vec<f64> {
         InertialSource::Guessed => (GUESSED, GUESSED),
         InertialSource::MassKnown => (ON_A_SCALE, GUESSED),
     };
-    [&[of_mass * MASS * mass][..], &[of_shape * moment; 3], &[of_shape * inertia; 6]].concat()
+    [&[of_mass * (MASS * mass)][..], &[of_shape * moment; 3], &[of_shape * inertia; 6]].concat()
 }
 
 /// The error with these ten coefficients of the link's regressor.

@@ -17,7 +17,7 @@ pub fn sentences(diagnosis: &Diagnosis, evidence: &Evidence) -> [String; 3] {
 
 fn place(diagnosis: &Diagnosis, evidence: &Evidence) -> String {
     let torque = &diagnosis.gap.torque;
-    let Some((joint, rms)) = largest(diagnosis) else {
+    let Some((joint, rms)) = super::plain::largest(diagnosis) else {
         return "No torque gap could be evaluated on these logs.".into();
     };
     let unit = words::torque_unit(joint, evidence, &diagnosis.gap.regimes);
@@ -131,13 +131,6 @@ fn shrinks(shrink: f64, interval: Option<[f64; 2]>) -> String {
     } else {
         format!("shrinks by {}{interval}", percent_within(shrink, ends))
     }
-}
-
-/// The joint with the largest torque gap.
-pub fn largest(diagnosis: &Diagnosis) -> Option<(&str, f64)> {
-    let rms = &diagnosis.gap.torque.rms;
-    let list = diagnosis.joints.iter().filter_map(|j| Some((j.as_str(), *rms.get(j)?))).filter(|(_, v)| v.is_finite());
-    list.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// How many joints have a torque gap above the noise floor.

@@ -46,7 +46,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::Serialize;
 
 pub use answer::sentences as answer_sentences;
-pub use answer::{changed, headline, is_above_floor, largest};
+pub use answer::{changed, headline, is_above_floor};
 pub use axis::Axis;
 pub use format::{
     NONE, Printed, count, estimate, figure, percent, percent_figure, percent_interval, percent_within, plain,
@@ -54,6 +54,7 @@ pub use format::{
 };
 pub use heatmap::picture as heatmap_picture;
 pub use index::{Entry, Found, page as index_page};
+pub use plain::largest;
 pub use power::line as power_line;
 pub use rest::sentence as sentence_of_the_rest;
 pub use rollout::page as rollout_page;

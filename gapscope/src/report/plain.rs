@@ -2,7 +2,6 @@
 //!
 //! The terminal and the page begin with these very words.
 
-use super::answer::largest;
 use super::format::{count, figure, percent, plain, with_unit};
 use super::{clause, words};
 use gapscope_datasets::Fault;
@@ -51,6 +50,13 @@ pub fn effects(list: &[FoundEffect], all: &[String], sums: &[Combination]) -> St
     }
     let also = if named.is_empty() { String::new() } else { format!(" Beside it: {}.", words::list(&named, "and")) };
     format!("{}.{also}", clause::of(first, all, sums))
+}
+
+/// The joint with the largest torque gap.
+pub fn largest(diagnosis: &Diagnosis) -> Option<(&str, f64)> {
+    let rms = &diagnosis.gap.torque.rms;
+    let list = diagnosis.joints.iter().filter_map(|j| Some((j.as_str(), *rms.get(j)?))).filter(|(_, v)| v.is_finite());
+    list.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Whether no effect was found in logs that are too short to find one: that every effect was tried then says nothing.

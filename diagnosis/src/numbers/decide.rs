@@ -85,8 +85,8 @@ numbers! {
     /// Beyond this multiple of that, the weight of a row falls with the square.
     FAR_OUT = 2.0, "factor";
 
-    /// Beyond any doubt, also as the best of a hundred tries: a row that stands out, a drive that is not rigid, a torque that is
-    /// no artefact of its noise, an experiment that parts two accounts.
+    /// Beyond any doubt, also as the best of a hundred tries: a row that stands out, a drive that is not rigid, an experiment
+    /// that parts two accounts.
     CLEAR = 5.0, "standard deviations";
 
     /// Of the distribution of what is left: its tails are so heavy that neither a glitch nor a blow decides.

@@ -45,7 +45,6 @@ pub fn run(args: &Numbers) -> Result<String> {
         for factor in FACTORS {
             let turned = score(Some(format!("{}={factor}", number.name)))?;
             rows.push(row(number, factor, &turned, plain.differ(&turned)));
-            eprintln!("{}", rows[rows.len() - 1]);
         }
     }
     output::write(&page, &markdown(&rows, cases.len()))?;

@@ -29,13 +29,18 @@ impl Plant {
                 continue;
             }
             let needed: Vec<f64> = out[j].iter().zip(&dry[j]).map(|(rest, dry)| rest + dry).collect();
-            let likely = smoothed(&needed, HOLDS_OVER, motion.dt);
-            for k in (0..motion.len()).filter(rests) {
+            let mut bound = |k: usize| {
                 delivered[j] = self.actuation.at_joint(j, tau[j][k]);
                 let time = motion.start + k as f64 * motion.dt;
-                let limit = direction.bound(motion.v[j][k], time, &delivered).max(0.0);
-                let slips = likely[k].abs() > limit;
-                out[j][k] = if slips { needed[k] - limit.copysign(likely[k]) } else { 0.0 };
+                direction.bound(motion.v[j][k], time, &delivered).max(0.0)
+            };
+            // Friction under load is bounded by the effort, whose noise is in every sample as well.
+            let bounds: Vec<f64> = (0..motion.len()).map(&mut bound).collect();
+            let mean = |x: &[f64]| smoothed(x, HOLDS_OVER, motion.dt);
+            let (likely, limit) = (mean(&needed), mean(&bounds));
+            for k in (0..motion.len()).filter(rests) {
+                let slips = likely[k].abs() > limit[k];
+                out[j][k] = if slips { needed[k] - limit[k].copysign(likely[k]) } else { 0.0 };
                 dry[j][k] = needed[k] - out[j][k];
             }
         }

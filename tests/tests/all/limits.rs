@@ -5,7 +5,6 @@ use gapscope_effects::{Effect, LoadDependentFriction, TorqueSaturation};
 use gapscope_tests::{diagnose, robot};
 
 #[test]
-#[ignore = "the limit is found, the friction under load beside it is not, since the mends of stop 40; the cause is not found: issue 23"]
 fn a_limit_is_found_where_the_effort_is_noisy() {
     let model = robot("double_pendulum");
     let on = |joints: std::ops::Range<usize>, value: f64| {

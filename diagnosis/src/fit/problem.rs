@@ -102,11 +102,7 @@ impl Problem {
             .collect();
         for (e, s) in signals.iter().enumerate() {
             let motion = s.motion(model, standstill);
-            let alignment = Column {
-                rows: (0..n).map(|j| (j, s.taken_rate(j))).collect(),
-                at_least: -half_sample,
-                at_most: half_sample,
-            };
+            let alignment = alignment(s, n);
             let fresh: Vec<Option<Vec<Column>>> =
                 terms.par_iter().map(|t| known_of(t).is_none().then(|| t.columns(&motion))).collect();
             let columns: Vec<Columns<'_>> = terms
@@ -282,48 +278,13 @@ impl Problem {
         standstill: &[f64],
         changes: &[(usize, Candidate)],
     ) {
-        self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
-            let Some(at) = rows.columns.iter().position(|&column| column == 0) else { return };
-            let mut values = vec![0.0; band.rows.len()];
-            for (e, s) in signals.iter().enumerate() {
-                let filtered = band.filter_where(e, &s.slides(j, standstill[j]), &s.taken_rate(j));
-                for (row, x) in band.of_episode[e].clone().zip(filtered) {
-                    values[row] = x.unwrap_or(0.0);
-                }
-            }
-            let m = rows.columns.len();
-            for (r, &row) in rows.rows.iter().enumerate() {
-                rows.values[r * m + at] = values[row];
-            }
-        });
+        let taken: Vec<Vec<Column>> = signals.iter().map(|s| vec![alignment(s, self.joints.len())]).collect();
+        self.fill(signals, band, standstill, 0, &taken);
         for (c, candidate) in changes {
             let begin = self.entries[*c].columns.start;
             let runs: Vec<Vec<Column>> =
                 signals.iter().map(|s| candidate.columns(&s.motion(model, standstill))).collect();
-            self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
-                let mut values: Vec<Vec<f64>> = vec![vec![0.0; band.rows.len()]; runs[0].len()];
-                let mut touched = false;
-                for (e, columns) in runs.iter().enumerate() {
-                    let counts = signals[e].slides(j, standstill[j]);
-                    for (values, column) in values.iter_mut().zip(columns) {
-                        for (_, x) in column.rows.iter().filter(|(row, _)| *row == j) {
-                            touched = true;
-                            for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts, x)) {
-                                values[row] = x.unwrap_or(0.0);
-                            }
-                        }
-                    }
-                }
-                if touched {
-                    let m = rows.columns.len();
-                    for (i, values) in values.iter().enumerate() {
-                        let Some(at) = rows.columns.iter().position(|&column| column == begin + i) else { continue };
-                        for (r, &row) in rows.rows.iter().enumerate() {
-                            rows.values[r * m + at] = values[row];
-                        }
-                    }
-                }
-            });
+            self.fill(signals, band, standstill, begin, &runs);
             for (i, column) in runs[0].iter().enumerate() {
                 self.bounds[begin + i] = (column.at_least, column.at_most);
             }
@@ -331,6 +292,39 @@ impl Problem {
         }
         self.accumulate(band);
     }
+
+    /// Writes new values, `[run][column]`, over the columns from `begin` on. A joint that a column does not act on keeps what it has.
+    fn fill(&mut self, signals: &[Signals], band: &Band, standstill: &[f64], begin: usize, runs: &[Vec<Column>]) {
+        let width = runs.first().map_or(0, Vec::len);
+        self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
+            let m = rows.columns.len();
+            for i in 0..width {
+                let of_joint = |run: &'_ Vec<Column>| run[i].rows.iter().any(|(row, _)| *row == j);
+                let Some(at) = rows.columns.iter().position(|&column| column == begin + i) else { continue };
+                if !runs.iter().any(of_joint) {
+                    continue;
+                }
+                let mut values = vec![0.0; band.rows.len()];
+                for (e, (s, run)) in signals.iter().zip(runs).enumerate() {
+                    let counts = s.slides(j, standstill[j]);
+                    for (_, x) in run[i].rows.iter().filter(|(row, _)| *row == j) {
+                        for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts, x)) {
+                            values[row] = x.unwrap_or(0.0);
+                        }
+                    }
+                }
+                for (r, &row) in rows.rows.iter().enumerate() {
+                    rows.values[r * m + at] = values[row];
+                }
+            }
+        });
+    }
+}
+
+/// The column that says how late the effort of a run comes behind its position.
+fn alignment(s: &Signals, joints: usize) -> Column {
+    let rows = (0..joints).map(|j| (j, s.taken_rate(j))).collect();
+    Column { rows, at_least: f64::NEG_INFINITY, at_most: f64::INFINITY }
 }
 
 /// Columns of a candidate on one run, sample by sample, or on all runs at the rows of the band.

@@ -1,5 +1,6 @@
 //! Fits whose links are bodies: to the deviance comes, for each link, a little of its log-det divergence from the URDF
-//! ([`gapscope_effects::Body`]), and Newton's method with a line search finds the least of the sum.
+//! ([`gapscope_effects::Body`]), and Newton's method with a line search finds the least of the sum (an interior point method: Boyd, Vandenberghe, Convex
+//! Optimization, 2004, chapter 11).
 
 use super::Problem;
 use gapscope_effects::Body;
@@ -13,6 +14,8 @@ const BODIES_PULL: f64 = 0.01;
 const STEPS: usize = 40;
 const HALVINGS: usize = 30;
 const SETTLED: f64 = 1e-6;
+/// Powers of ten by which the divergence counts more at first, where least squares alone would leave no body.
+const FROM_OUTSIDE: i32 = 6;
 
 /// A link, and where among some columns stand the ten numbers that add to it, an error and what it carries.
 struct Link<'a> {
@@ -41,35 +44,57 @@ impl Problem {
             return theta;
         }
         let mut here = DVector::from_vec(theta);
+        let mut outside = false;
         for link in &links {
             // Towards the URDF until it is a body.
             while link.body.divergence(&link.more(&here)).is_none() {
                 link.at.iter().for_each(|&at| (at..at + 10).for_each(|i| here[i] *= 0.5));
+                outside = true;
             }
         }
+        // From beyond the edge of what a body can be, the way leads through its middle: at the edge, every step is cut short.
+        let first = if outside { FROM_OUTSIDE } else { 0 };
+        for tenfold in (0..=first).rev() {
+            here = self.settle(columns, gram, moment, held, here, &links, BODIES_PULL * 10f64.powi(tenfold));
+        }
+        here.iter().copied().collect()
+    }
+
+    /// The least of deviance and `pull` times the divergence of links, by Newton's method from a place where they are bodies.
+    #[expect(clippy::too_many_arguments, reason = "the normal equations are four of them")]
+    fn settle(
+        &self,
+        columns: &[usize],
+        gram: &DMatrix<f64>,
+        moment: &DVector<f64>,
+        held: &mut [Option<f64>],
+        mut here: DVector<f64>,
+        links: &[Link<'_>],
+        pull: f64,
+    ) -> DVector<f64> {
         let sum = |theta: &DVector<f64>| -> f64 {
             let divergence = |link: &Link| link.body.divergence(&link.more(theta)).map_or(f64::INFINITY, |d| d.value);
             let fit = 0.5 * theta.dot(&(gram * theta)) - moment.dot(theta);
-            fit + BODIES_PULL * links.iter().map(divergence).sum::<f64>()
+            fit + pull * links.iter().map(divergence).sum::<f64>()
         };
         let mut least = sum(&here);
         for _ in 0..STEPS {
-            let (mut curved, mut pull) = (gram.clone(), moment.clone());
-            for link in &links {
+            let (mut curved, mut pulled) = (gram.clone(), moment.clone());
+            for link in links {
                 let Some(divergence) = link.body.divergence(&link.more(&here)) else { continue };
-                let (gradient, hessian) = (divergence.gradient * BODIES_PULL, divergence.hessian * BODIES_PULL);
+                let (gradient, hessian) = (divergence.gradient * pull, divergence.hessian * pull);
                 let own: DVector<f64> = DVector::from_row_slice(&link.more(&here));
                 let target = hessian * own - gradient;
                 for &a in &link.at {
                     for i in 0..10 {
-                        pull[a + i] += target[i];
+                        pulled[a + i] += target[i];
                         for &b in &link.at {
                             (0..10).for_each(|k| curved[(a + i, b + k)] += hessian[(i, k)]);
                         }
                     }
                 }
             }
-            let step = DVector::from_vec(self.descend(columns, &curved, &pull, held)) - &here;
+            let step = DVector::from_vec(self.descend(columns, &curved, &pulled, held)) - &here;
             let tried = (0..HALVINGS).map(|halvings| &here + &step * 0.5f64.powi(halvings as i32));
             let Some((next, value)) =
                 tried.map(|next| (sum(&next), next)).find(|(value, _)| *value < least).map(|(v, n)| (n, v))
@@ -82,7 +107,7 @@ impl Problem {
                 break;
             }
         }
-        here.iter().copied().collect()
+        here
     }
 
     /// The links that some columns add to. A load that is there is a body of its own and no part of its link; one that is

@@ -12,9 +12,10 @@ use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Rounds, at most.
-const ROUNDS: usize = 8;
-/// Rounds, at least, where some torque bends with the coefficients.
-const ROUNDS_FOR_BENT: usize = 6;
+const ROUNDS: usize = 30;
+/// Change of the misfit, see [`Problem::misfit`], at which torque that bends with the coefficients has settled: a twentieth of
+/// a nat. Friction under load that passes for a gain comes nearer by a part of the way each time.
+const SETTLED_BENT: f64 = 0.1;
 /// Relative change of a knob at which it has settled.
 const SETTLED: f64 = 2e-3;
 /// Rounds, at most, where a drive turns on its own: friction behind it comes nearer by a part of the way each time.
@@ -217,7 +218,7 @@ impl Data<'_> {
         let set: Vec<usize> = (0..terms.len()).collect();
         let mut found: Option<Bend> = None;
         let bends = candidates.iter().any(|c| c.kind.card().bends);
-        let least = if bends { ROUNDS_FOR_BENT } else { 1 };
+        let mut misfit_before = f64::INFINITY;
         let turns = candidates.iter().any(Candidate::turns);
         let most = if turns { ROUNDS_OF_TURNING } else { ROUNDS };
         let mut settled = !turns;
@@ -263,7 +264,10 @@ impl Data<'_> {
                     }
                 }
             }
-            if round >= most || (round >= least && change < SETTLED && settled) {
+            let misfit = problem.misfit(&fit, self.band);
+            let still = !bends || turns || (misfit - misfit_before).abs() < SETTLED_BENT;
+            misfit_before = misfit;
+            if round >= most || (round >= 1 && change < SETTLED && settled && still) {
                 if let Some(last) = &reached
                     && data.look(&problem, &fit)?.1 > last.misfit
                 {

@@ -7,7 +7,7 @@ use crate::search::climb;
 use crate::search::climb::Choice;
 use crate::search::rivals;
 use crate::search::rivals::Rival;
-use gapscope_effects::EffectError;
+use gapscope_effects::{EffectError, Kind};
 
 /// Times that a likelier account takes the place of what was chosen.
 const AGAIN: usize = 2;
@@ -55,6 +55,10 @@ impl Record<'_> {
                 chosen = without;
                 continue;
             }
+            if let Some(next) = self.spread(&chosen, kind)? {
+                chosen = next;
+                continue;
+            }
             let doubtful = |rival: &&Rival| !kind.is_calibration() && odds.min(rival.odds) < DOUBTFUL;
             if let Some(rival) = rival.filter(doubtful) {
                 let mut all = chosen.all.clone();
@@ -89,40 +93,69 @@ impl Record<'_> {
         Ok(chosen)
     }
 
-    /// What was chosen without the candidates of which every interval holds nothing: what blocks of time do not agree on was
+    /// What was chosen with another of its kinds in the joints of one kind, where that is likelier: what is in some joints of a
+    /// robot is likelier in one more than something else is. In a first look a law that reads the torque found stands beside
+    /// the torque of another account.
+    fn spread(&self, chosen: &Chosen, kind: Kind) -> Result<Option<Chosen>, EffectError> {
+        let entry = |c: &usize| &chosen.all.entries[*c].candidate;
+        let (own, rest): (Vec<usize>, Vec<usize>) = chosen.choice.set.iter().partition(|c| entry(c).kind == kind);
+        for other in climb::kinds(&chosen.all, &rest) {
+            if kind.is_calibration() || other.is_calibration() || other.is_outside() || !other.card().reads_found {
+                continue;
+            }
+            let there =
+                |c: &usize| entry(c).kind == other && own.iter().any(|own| entry(own).joints == entry(c).joints);
+            let mut set: Vec<usize> = (0..chosen.all.entries.len()).filter(there).chain(rest.iter().copied()).collect();
+            set.sort_unstable();
+            set.dedup();
+            if set.len() != chosen.choice.set.len() {
+                continue;
+            }
+            let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
+            let next = chosen.with(Choice { set }, exact, fit);
+            if next.odds_against(chosen, self)? > 0.0 {
+                return Ok(Some(next));
+            }
+        }
+        Ok(None)
+    }
+
+    /// What was chosen without candidates of which every interval holds nothing, one by one: what blocks of time do not agree on was
     /// not shown by them. Links stay, of which the URDF says what they may be. Where nothing of a kind is left, what else there
     /// is has its turn without it.
     pub(crate) fn shown(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let speeds = speeds(&self.signals, &self.band, self.model.dof());
         for kind in climb::kinds(&chosen.all, &chosen.choice.set) {
             // Candidates of a choice and entries at its exact law stand in one order.
-            let of_kind = |i: usize| {
+            let of_kind = |chosen: &Chosen, i: usize| {
                 let candidate = &chosen.exact.entries[i].candidate;
                 let is_link = kind.is_calibration() && candidate.link().is_some();
                 candidate.kind == kind && !candidate.turns() && !is_link && !kind.is_outside()
             };
-            let own: Vec<usize> = (0..chosen.exact.entries.len()).filter(|&i| of_kind(i)).collect();
-            let halves = chosen.fit.half_widths(&chosen.exact, &own, &speeds);
-            let holds_nothing = |(i, half): &(&usize, Vec<f64>)| {
-                let (_, theta) = chosen.fit.own(&chosen.exact, **i);
-                theta.iter().zip(half).all(|(theta, half)| theta.abs() < *half)
-            };
-            let gone: Vec<usize> = own.iter().zip(halves).filter(holds_nothing).map(|(&i, _)| i).collect();
-            if gone.is_empty() {
-                continue;
+            // The one that shows least goes first: of two that stand for each other, each holds nothing beside the other.
+            loop {
+                let own: Vec<usize> = (0..chosen.exact.entries.len()).filter(|&i| of_kind(&chosen, i)).collect();
+                let halves = chosen.fit.half_widths(&chosen.exact, &own, &speeds);
+                let shows = |(&i, half): (&usize, Vec<f64>)| {
+                    let (_, theta) = chosen.fit.own(&chosen.exact, i);
+                    let parts = theta.iter().zip(half).map(|(theta, half)| theta.abs() / half);
+                    (i, parts.fold(0.0, f64::max))
+                };
+                let least = own.iter().zip(halves).map(shows).min_by(|a, b| a.1.total_cmp(&b.1));
+                let Some((gone, _)) = least.filter(|(_, shows)| *shows < 1.0) else { break };
+                let mut set = chosen.choice.set.clone();
+                set.remove(gone);
+                if own.len() > 1 {
+                    let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
+                    chosen = chosen.with(Choice { set }, exact, fit);
+                    continue;
+                }
+                let mut all = chosen.all.clone();
+                all.closed.push(kind);
+                let next = self.converge(all, Choice { set }, chosen.noise.clone(), chosen.turned.clone(), progress)?;
+                chosen = Chosen { tried: chosen.tried, needed: chosen.needed, ..next };
+                break;
             }
-            let set =
-                chosen.choice.set.iter().enumerate().filter(|(i, _)| !gone.contains(i)).map(|(_, &c)| c).collect();
-            let choice = Choice { set };
-            if gone.len() < own.len() {
-                let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &choice.set, chosen.turned.as_ref())?;
-                chosen = chosen.with(choice, exact, fit);
-                continue;
-            }
-            let mut all = chosen.all.clone();
-            all.closed.push(kind);
-            let next = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
-            chosen = Chosen { tried: chosen.tried, needed: chosen.needed, ..next };
         }
         Ok(chosen)
     }

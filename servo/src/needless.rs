@@ -18,8 +18,10 @@ pub fn drop_needless(
         let mut worth = Vec::new();
         let mut sure = Vec::new();
         let missing = Missing::new(best);
+        let spread = Spread::of(best, choice.joint);
         for &kind in kinds.iter() {
-            if let Some(nats) = choice.surely(best, kinds, kind, samples, &missing) {
+            let off = choice.off_nothing(best, kind, samples, &spread);
+            if let Some(nats) = choice.surely(best, kinds, kind, samples, &missing).filter(|_| off > TAKEN) {
                 sure.push((kind, nats));
                 continue;
             }
@@ -29,11 +31,13 @@ pub fn drop_needless(
             let mut law = best.law;
             kind.clear(&mut law, &choice.joint.start, &without);
             let poor = choice.fit(&law, &without, None, TRIAL);
-            let nats = choice.nats(best, &poor, kind, samples);
+            // Its number must lie off nothing as well: a fit falls by what a loop that answers late does.
+            let nats = choice.nats(best, &poor, kind, samples).min(off);
             // The bodies of the URDF weigh something for certain: where their weight alone accounts for a constant torque,
             // and fixes the drive's scale, no bias takes its place.
-            let weightless =
-                kind == Kind::Bias && !Spread::of(best).scale_is_known() && Spread::of(&poor).scale_is_known();
+            let weightless = kind == Kind::Bias
+                && !Spread::of(best, choice.joint).scale_is_known()
+                && Spread::of(&poor, choice.joint).scale_is_known();
             let relevant = choice.relevant(best, &poor) && !weightless;
             worth.push((kind, nats, relevant, poor, without));
         }
@@ -77,8 +81,12 @@ fn needless_pair(
 ) -> Option<([Kind; 2], f64, Vec<Kind>, Fit)> {
     let is_based_on = |kind: Kind| kinds.iter().any(|other| other.base() == Some(kind));
     let usual: Vec<Kind> = kinds.iter().copied().filter(|kind| kind.cost() == 0.0 && !is_based_on(*kind)).collect();
+    let missing = Missing::new(best);
     for (i, &a) in usual.iter().enumerate() {
         for &b in &usual[i + 1..] {
+            if choice.surely_both(best, [a, b], samples, &missing) {
+                continue;
+            }
             let without: Vec<Kind> = kinds.iter().copied().filter(|other| ![a, b].contains(other)).collect();
             let mut law = best.law;
             [a, b].into_iter().for_each(|kind| kind.clear(&mut law, &choice.joint.start, &without));
@@ -120,6 +128,31 @@ impl Missing {
 }
 
 impl Choice<'_> {
+    /// Nats by which the number of a kind lies off nothing, by all that may move it; infinite where nothing is no number of it.
+    fn off_nothing(&self, best: &Fit, kind: Kind, samples: f64, spread: &Spread) -> f64 {
+        let Some(&(param, _, _)) = kind.parameters().first() else { return f64::INFINITY };
+        let distance = best.law[param] - self.joint.start[param];
+        if kind.is_threshold() || !distance.is_finite() {
+            return f64::INFINITY;
+        }
+        let Some(deviation) = spread.deviation(param) else { return f64::INFINITY };
+        let more = kind.parameters().len() as f64;
+        0.5 * (distance / deviation.max(1e-300)).powi(2) - 0.5 * more * samples.ln() - kind.cost()
+    }
+
+    /// Whether there can be no doubt of two kinds together.
+    fn surely_both(&self, best: &Fit, pair: [Kind; 2], samples: f64, missing: &Missing) -> bool {
+        let params = pair.iter().flat_map(|kind| kind.parameters().iter().map(|(param, _, _)| *param));
+        let places = params.map(|param| Some((best.free.iter().position(|free| *free == param)?, param)));
+        let Some(places) = places.collect::<Option<Vec<_>>>() else { return false };
+        let (at, distance): (Vec<usize>, Vec<f64>) =
+            places.into_iter().map(|(at, param)| (at, best.law[param] - self.joint.start[param])).unzip();
+        let Some(loss) = missing.loss(&at, &distance) else { return false };
+        let nats =
+            0.5 * samples * ((best.cost + loss) / best.cost.max(1e-300)).ln() - at.len() as f64 * 0.5 * samples.ln();
+        nats > SURE && loss > 4.0 * self.least(best.cost)
+    }
+
     /// Nats that a kind is worth where there can be no doubt of it; `None` where a fit without it must say.
     fn surely(&self, best: &Fit, kinds: &[Kind], kind: Kind, samples: f64, missing: &Missing) -> Option<f64> {
         if kind.is_threshold() || kind == Kind::Bias || kinds.iter().any(|other| other.base() == Some(kind)) {

@@ -61,7 +61,19 @@ impl Held {
         self.values[k]
     }
 
+    /// Its rate at each sample, by the samples on both sides: a jump is spread over a sample before and one after it, so that
+    /// it acts when it should in the mean.
+    pub fn rate(&self) -> Held {
+        let last = self.values.len() - 1;
+        let of = |k: usize| {
+            let (from, to) = (k.saturating_sub(1), (k + 1).min(last));
+            (self.values[to] - self.values[from]) / (self.time[to] - self.time[from]).max(1e-9)
+        };
+        Held::new(&self.time, &(0..=last).map(of).collect::<Vec<_>>())
+    }
+
     /// ∫ from the first sample to t; `hint` is a sample near t, moved to the last one before it.
+    #[inline(always)]
     fn until(&self, t: f64, hint: &mut usize) -> f64 {
         let last = self.values.len() - 1;
         while *hint > 0 && self.time[*hint] > t {
@@ -75,24 +87,68 @@ impl Held {
     }
 
     /// Mean from `t` to `t + h`.
+    #[inline(always)]
     pub fn mean(&self, t: f64, h: f64, hint: &mut usize) -> f64 {
         let start = self.until(t, hint);
         (self.until(t + h, hint) - start) / h
     }
 }
 
-/// What the rest of the arm does to one joint along a log, a row for each sample. With the joint elsewhere than measured by d,
-/// gravity is `gravity` cos d + `slope` sin d: exact for a joint that turns, as is an inertia that does not change with d.
+/// What the rest of the arm does to one joint at an instant. With the joint elsewhere than at `position` by d, gravity is
+/// `gravity` cos d + `slope` sin d: exact for a joint that turns, as is an inertia that does not change with d.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Around {
+    /// Position of the joint, rad.
+    pub position: f64,
+    /// M_jj, kg m².
+    pub inertia: f64,
+    /// Gravity torque there, N m.
+    pub gravity: f64,
+    /// Its derivative by the joint's own position, N m/rad.
+    pub slope: f64,
+    /// Torque by the motion of other joints, N m.
+    pub coupling: f64,
+}
+
+impl Around {
+    /// Part of the way to another.
+    #[inline]
+    pub fn towards(&self, next: &Around, part: f64) -> Around {
+        let between = |a: f64, b: f64| a + part * (b - a);
+        Around {
+            position: between(self.position, next.position),
+            inertia: between(self.inertia, next.inertia),
+            gravity: between(self.gravity, next.gravity),
+            slope: between(self.slope, next.slope),
+            coupling: between(self.coupling, next.coupling),
+        }
+    }
+}
+
+/// What the rest of the arm does to one joint along a log: some rows in each interval between samples.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Surroundings {
-    /// M_jj, kg m².
-    pub inertia: Vec<f64>,
-    /// Gravity torque at the measured position, N m.
-    pub gravity: Vec<f64>,
-    /// Its derivative by the joint's own position, N m/rad.
-    pub slope: Vec<f64>,
-    /// Torque by the motion of other joints, N m.
-    pub coupling: Vec<f64>,
+    /// Rows in an interval.
+    pub per: usize,
+    /// The rows.
+    pub rows: Vec<Around>,
+}
+
+impl Surroundings {
+    /// At a sample.
+    #[inline]
+    pub fn at(&self, sample: usize) -> Around {
+        self.rows[sample * self.per]
+    }
+
+    /// A part of the way from a sample to the next, less than all of it.
+    #[inline(always)]
+    pub fn within(&self, sample: usize, part: f64) -> Around {
+        let along = part * self.per as f64;
+        let row = along as usize;
+        let from = sample * self.per + row;
+        self.rows[from].towards(&self.rows[from + 1], along - row as f64)
+    }
 }
 
 /// One joint's part of one log.
@@ -104,6 +160,8 @@ pub struct Run {
     pub position: Vec<f64>,
     /// Set point.
     pub target: Option<Held>,
+    /// Its rate, rad/s.
+    pub target_rate: Option<Held>,
     /// Logged w, where nothing else tells what the drive does.
     pub delivered: Option<Held>,
     /// Whether the motor is on, from each sample to the next.

@@ -3,7 +3,7 @@
 //! Each step solves (M/h + D) v⁺ = rhs − friction by sweeps over the joints, each joint with its own law and its own dry
 //! friction (projected Gauss–Seidel, as in Moreau's time stepping). Rows are in units of what each drive follows.
 
-use crate::around::Trace;
+use crate::around::{FINE, Trace};
 use crate::law::{END, Law, Param, Row};
 use crate::prepare::Joint;
 use crate::simulate::{State, Tracer, order};
@@ -38,7 +38,7 @@ pub fn simulate_span(
     log: usize,
     span: Range<usize>,
 ) -> Vec<Vec<f64>> {
-    follow(model, laws, joints, log, span, |_, _, _, _| {})
+    follow(model, laws, joints, log, span, f64::INFINITY, |_, _, _, _| {})
 }
 
 /// How laws move all joints along a log; `None` where a joint has no law, or where the arm flies off.
@@ -47,20 +47,22 @@ pub fn trace_arm(model: &Model, laws: &[Option<Law>], joints: &[Joint], log: usi
     let mut tracers: Vec<Tracer> =
         own.iter().zip(joints).map(|(law, joint)| Tracer::new(law, &joint.runs[log])).collect();
     let samples = joints.first().map_or(0, |joint| joint.runs[log].time.len());
-    let path =
-        follow(model, laws, joints, log, 0..samples, |j, span, before, after| tracers[j].see(span, before, after));
+    let path = follow(model, laws, joints, log, 0..samples, FINE, |j, span, before, after| {
+        tracers[j].see(span, before, after)
+    });
     let sound = path.iter().flatten().all(|q| q.is_finite());
     let finished = tracers.into_iter().zip(joints).zip(path);
     sound.then(|| finished.map(|((tracer, joint), shown)| Some(tracer.finish(&joint.runs[log], shown))).collect())
 }
 
-/// Simulates; `see` is told of each step of each joint: where it lies, in samples, and the link's state before and after it.
+/// Simulates by steps of at most `longest` s; `see` is told of each step of each joint: where it lies, in samples, and the link's state before and after it.
 fn follow(
     model: &Model,
     laws: &[Option<Law>],
     joints: &[Joint],
     log: usize,
     span: Range<usize>,
+    longest: f64,
     mut see: impl FnMut(usize, [f64; 2], State, State),
 ) -> Vec<Vec<f64>> {
     let n = model.dof();
@@ -105,7 +107,7 @@ fn follow(
     for (q, state) in q.iter_mut().zip(&wound) {
         *q = state.map_or(*q, |state| state.link[0]);
     }
-    let step = joints.iter().map(|joint| joint.runs[log].step).fold(f64::INFINITY, f64::min);
+    let step = joints.iter().map(|joint| joint.runs[log].step).fold(longest, f64::min);
     for k in first..span.end - 1 {
         let dt = time[k + 1] - time[k];
         let parts = (dt / step - 1e-6).ceil().max(1.0);

@@ -41,7 +41,7 @@ fn parabola(time: &[f64], position: &[f64], k: usize) -> [f64; 3] {
 }
 
 /// Longest time between rows of surroundings, s: what other joints do between samples of a slow log is felt.
-const FINE: f64 = 1e-3;
+pub(crate) const FINE: f64 = 1e-3;
 
 /// How a law moved its joint along a log: the link, at rows, and what its encoder showed at samples.
 #[derive(Debug, Clone, Default)]
@@ -109,7 +109,7 @@ pub fn motion(episode: &Episode, stale: &[bool], traces: &[Option<Trace>]) -> Mo
 pub fn surroundings(model: &Model, motion: &Motion) -> Vec<Surroundings> {
     let n = model.dof();
     let count = motion.state.first().map_or(0, |state| state[0].len());
-    let mut around = vec![Surroundings { per: motion.per, rows: Vec::with_capacity(count) }; n];
+    let mut around = vec![Vec::with_capacity(count); n];
     let mut data = Data::new(model);
     let mut mass = DMatrix::zeros(n, n);
     let [mut q, mut v, mut a, mut gravity, mut tau, mut turned] = std::array::from_fn(|_| vec![0.0; n]);
@@ -131,7 +131,7 @@ pub fn surroundings(model: &Model, motion: &Motion) -> Vec<Surroundings> {
                 q[j] = here;
                 turned[j]
             };
-            around.rows.push(Around {
+            around.push(Around {
                 position: q[j],
                 inertia: mass[(j, j)],
                 gravity: gravity[j],
@@ -140,7 +140,7 @@ pub fn surroundings(model: &Model, motion: &Motion) -> Vec<Surroundings> {
             });
         }
     }
-    around
+    around.into_iter().map(|rows| Surroundings::new(motion.per, rows)).collect()
 }
 
 #[cfg(test)]

@@ -205,6 +205,12 @@ impl Kind {
         matches!(self, Kind::Saturation | Kind::SpeedLimit | Kind::DeadBand | Kind::Elasticity | Kind::Backlash)
     }
 
+    /// Whether the law is linear in all that it frees, so that a fit without it loses what a parabola says. Friction under load
+    /// scales all else that a drive does: without it the same motion is another drive's.
+    pub fn is_linear(self) -> bool {
+        matches!(self, Kind::Coulomb | Kind::Viscous | Kind::Armature | Kind::Bias | Kind::DampingError)
+    }
+
     /// Whether others stand in for it in a fit that has them before: friction for limits, which slow a joint down as well, and an
     /// early set point for one whose speed the drive knows.
     pub fn hides(self) -> bool {

@@ -179,6 +179,19 @@ pub(crate) fn way(h: f64) -> f64 {
     0.5 * h
 }
 
+/// Part of a step over which a servo acts whose error goes evenly from one value to another: switched by whole steps, it would
+/// rattle at the edge of its band as no servo does.
+#[inline]
+fn acting_part(band: f64, from: f64, to: f64) -> f64 {
+    let change = to - from;
+    let acts = [from, to].map(|error| DeadBand::acts(band, error));
+    if band == 0.0 || change == 0.0 || (acts == [true; 2] && from * to > 0.0) || acts == [false; 2] {
+        return f64::from(u8::from(acts[0]));
+    }
+    let [a, b] = [-band, band].map(|edge| ((edge - from) / change).clamp(0.0, 1.0));
+    1.0 - (b - a).abs()
+}
+
 impl Law {
     /// Time constant of the closed loop, s: damping over stiffness, or the period of the undamped loop over 2π where that is
     /// longer; `inertia` is σ M.
@@ -205,21 +218,21 @@ impl Law {
         let p = &self.values;
         let damping =
             p[Param::Viscous as usize] + if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] };
+        let gone = way(h) * v;
         let (mut stiffness, mut w) = match order {
             Order::Off => (0.0, 0.0),
             Order::Deliver(w) => (0.0, w),
             Order::Follow(target, gain, more) => {
                 let error = target - q;
-                if DeadBand::acts(p[Param::DeadBand as usize], error) {
-                    (gain, gain * error + more)
-                } else {
-                    (0.0, 0.0)
-                }
+                // A set point is the mean over the step.
+                let part = acting_part(p[Param::DeadBand as usize], error, error - 2.0 * gone);
+                (part * gain, part * (gain * error + more))
             }
         };
         let limit = p[Param::Limit as usize];
-        if w.abs() > limit {
-            (stiffness, w) = (0.0, limit.copysign(w));
+        let middle = w - stiffness * gone;
+        if middle.abs() > limit {
+            (stiffness, w) = (0.0, limit.copysign(middle));
         }
         let drag = stiffness * way(h) + damping;
         let armature = p[Param::Armature as usize] / h;
@@ -275,5 +288,26 @@ impl Law {
         let end = (push - bound.copysign(push)) / factor;
         let without = || (push - delivered - bound.copysign(push)) / factor;
         SpeedLimit::speed(end, delivered, self.values[Param::Speed as usize], without)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_servo_acts_for_the_part_of_a_step_that_lies_outside_its_dead_band() {
+        for (band, from, to, part) in [
+            (0.0, 0.1, -0.1, 1.0),
+            (1.0, 3.0, 2.0, 1.0),
+            (1.0, 0.5, -0.5, 0.0),
+            (1.0, 2.0, 0.0, 0.5),
+            (1.0, 0.0, -4.0, 0.75),
+            (1.0, 2.0, -2.0, 0.5),
+            (1.0, 0.3, 0.3, 0.0),
+        ] {
+            let found = acting_part(band, from, to);
+            assert!((found - part).abs() < 1e-12, "{band} {from} {to}: {found}");
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! What a fit does not miss is dropped; what could stand in the place of what stays is told.
 
 use crate::choice::{Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
-use crate::fit::{Fit, normal};
+use crate::fit::{Fit, cost, normal};
 use crate::interval::Spread;
 use crate::kinds::Kind;
 use crate::weigh::independent;
@@ -117,13 +117,18 @@ impl Missing {
         Missing { inverse: information.try_inverse() }
     }
 
-    /// dᵀ C⁻¹ d with the covariance C of the parameters at `at` and their distance d from where they would be.
-    fn loss(&self, at: &[usize], distance: &[f64]) -> Option<f64> {
+    /// dᵀ C⁻¹ d with the covariance C of the parameters at `at` and their distance d from where they would be; and the change of
+    /// all parameters that takes them there at the least cost.
+    fn loss(&self, at: &[usize], distance: &[f64]) -> Option<(f64, nalgebra::DVector<f64>)> {
         let inverse = self.inverse.as_ref()?;
         let block = nalgebra::DMatrix::from_fn(at.len(), at.len(), |i, j| inverse[(at[i], at[j])]);
         let d = nalgebra::DVector::from_column_slice(distance);
-        let loss = d.dot(&block.lu().solve(&d)?);
-        (loss.is_finite() && loss > 0.0).then_some(loss)
+        let pull = block.lu().solve(&d)?;
+        let loss = d.dot(&pull);
+        let change = nalgebra::DVector::from_fn(inverse.nrows(), |i, _| {
+            -at.iter().zip(pull.iter()).map(|(&j, pull)| inverse[(i, j)] * pull).sum::<f64>()
+        });
+        (loss.is_finite() && loss > 0.0).then_some((loss, change))
     }
 }
 
@@ -140,34 +145,40 @@ impl Choice<'_> {
         0.5 * (distance / deviation.max(1e-300)).powi(2) - 0.5 * more * samples.ln() - kind.cost()
     }
 
+    /// What a fit loses without some parameters where there can be no doubt of them: to second order, as far as the errors there
+    /// bear it out.
+    fn clear_loss(&self, best: &Fit, kinds: &[Kind], missing: &Missing) -> Option<(f64, f64)> {
+        let (mut at, mut distance) = (Vec::new(), Vec::new());
+        for (param, _, _) in kinds.iter().flat_map(|kind| kind.parameters()) {
+            at.push(best.free.iter().position(|free| free == param)?);
+            distance.push(best.law[*param] - self.joint.start[*param]);
+        }
+        let (linear, change) = missing.loss(&at, &distance)?;
+        let mut there = best.law;
+        for (&param, change) in best.free.iter().zip(change.iter()) {
+            let [least, greatest] = self.joint.ranges.bounds[param as usize];
+            there[param] = (there[param] + change).clamp(least, greatest);
+        }
+        let loss = linear.min(cost(&there, &self.joint.runs) - best.cost);
+        Some((loss, at.len() as f64)).filter(|_| loss > 4.0 * self.least(best.cost))
+    }
+
     /// Whether there can be no doubt of two kinds together.
     fn surely_both(&self, best: &Fit, pair: [Kind; 2], samples: f64, missing: &Missing) -> bool {
-        let params = pair.iter().flat_map(|kind| kind.parameters().iter().map(|(param, _, _)| *param));
-        let places = params.map(|param| Some((best.free.iter().position(|free| *free == param)?, param)));
-        let Some(places) = places.collect::<Option<Vec<_>>>() else { return false };
-        let (at, distance): (Vec<usize>, Vec<f64>) =
-            places.into_iter().map(|(at, param)| (at, best.law[param] - self.joint.start[param])).unzip();
-        let Some(loss) = missing.loss(&at, &distance) else { return false };
-        let nats =
-            0.5 * samples * ((best.cost + loss) / best.cost.max(1e-300)).ln() - at.len() as f64 * 0.5 * samples.ln();
-        nats > SURE && loss > 4.0 * self.least(best.cost)
+        self.clear_loss(best, &pair, missing).is_some_and(|(loss, numbers)| {
+            0.5 * samples * ((best.cost + loss) / best.cost.max(1e-300)).ln() - 0.5 * numbers * samples.ln() > SURE
+        })
     }
 
     /// Nats that a kind is worth where there can be no doubt of it; `None` where a fit without it must say.
     fn surely(&self, best: &Fit, kinds: &[Kind], kind: Kind, samples: f64, missing: &Missing) -> Option<f64> {
-        if kind.is_threshold() || kind == Kind::Bias || kinds.iter().any(|other| other.base() == Some(kind)) {
+        if !kind.is_linear() || kind == Kind::Bias || kinds.iter().any(|other| other.base() == Some(kind)) {
             return None;
         }
-        let (mut at, mut distance) = (Vec::new(), Vec::new());
-        for (param, _, _) in kind.parameters() {
-            at.push(best.free.iter().position(|free| free == param)?);
-            distance.push(best.law[*param] - self.joint.start[*param]);
-        }
-        let loss = missing.loss(&at, &distance)?;
-        let more = kind.parameters().len() as f64;
+        let (loss, more) = self.clear_loss(best, &[kind], missing)?;
         let nats =
             0.5 * samples * ((best.cost + loss) / best.cost.max(1e-300)).ln() - 0.5 * more * samples.ln() - kind.cost();
-        (nats > SURE && loss > 4.0 * self.least(best.cost)).then_some(nats)
+        (nats > SURE).then_some(nats)
     }
 }
 

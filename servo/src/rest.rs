@@ -51,7 +51,7 @@ mod tests {
         let count = position.len();
         let time: Vec<f64> = (0..count).map(|k| 0.01 * k as f64).collect();
         let zeros = vec![0.0; count];
-        let around = Surroundings { per: 1, rows: vec![Around { inertia: 0.01, ..Around::default() }; count] };
+        let around = Surroundings::new(1, vec![Around { inertia: 0.01, ..Around::default() }; count]);
         let run = Run {
             target: Some(Held::new(&time, &zeros)),
             target_rate: None,

@@ -107,7 +107,8 @@ fn follow(law: &Law, run: &Run, out: &mut Vec<f64>, mut see: impl FnMut([f64; 2]
         let parts = (dt / run.step - 1e-6).ceil().max(1.0);
         let (h, of_sample) = (dt / parts, 1.0 / parts);
         for part in 0..parts as usize {
-            let around = run.around.within(k, (part as f64 + 0.5) * of_sample);
+            let span = [part, part + 1].map(|part| part as f64 * of_sample);
+            let around = run.around.over(k, span);
             let inertia = sigma * around.inertia / h;
             let weight = weight(&around, q + 0.5 * h * v - law[Param::Offset]);
             let order = order(law, run, k, run.time[k] + part as f64 * h, h, &mut hint);
@@ -116,7 +117,7 @@ fn follow(law: &Law, run: &Run, out: &mut Vec<f64>, mut see: impl FnMut([f64; 2]
             let end = law.settle(&row, v, row.factor + inertia, push);
             let before = (q, v);
             (q, v) = (Law::move_on(h, row.end, q, v, end), end);
-            see([part, part + 1].map(|part| k as f64 + part as f64 * of_sample), before, (q, v));
+            see(span.map(|part| k as f64 + part), before, (q, v));
         }
         out.push(q);
     }
@@ -140,7 +141,8 @@ fn follow_wound(law: &Law, shaft: &Shaft, run: &Run, out: &mut Vec<f64>, mut see
         let parts = (dt / run.step - 1e-6).ceil().max(1.0);
         let (h, of_sample) = (dt / parts, 1.0 / parts);
         for part in 0..parts as usize {
-            let around = run.around.within(k, (part as f64 + 0.5) * of_sample);
+            let span = [part, part + 1].map(|part| part as f64 * of_sample);
+            let around = run.around.over(k, span);
             let weight = weight(&around, state.link[0] + 0.5 * h * state.link[1] - law[Param::Offset]);
             let inertia = sigma * around.inertia / h;
             let order = order(law, run, k, run.time[k] + part as f64 * h, h, &mut hint);
@@ -151,7 +153,7 @@ fn follow_wound(law: &Law, shaft: &Shaft, run: &Run, out: &mut Vec<f64>, mut see
             let speed = state.motor[1];
             shaft.step(h, &mut state, &row, inertia, push, |factor, push| law.settle(&row, speed, factor, push));
             let after = (state.link[0], state.link[1]);
-            see([part, part + 1].map(|part| k as f64 + part as f64 * of_sample), before, after);
+            see(span.map(|part| k as f64 + part), before, after);
         }
         out.push(shown(&state));
     }

@@ -289,9 +289,8 @@ fn shifted(base: &Around, plain: &Around, probed: &Around) -> Around {
         slope: a.slope + c.slope - b.slope,
         coupling: a.coupling + c.coupling - b.coupling,
     };
-    let one = |((a, b), c): ((&Surroundings, &Surroundings), &Surroundings)| Surroundings {
-        per: a.per,
-        rows: a.rows.iter().zip(&b.rows).zip(&c.rows).map(row).collect(),
+    let one = |((a, b), c): ((&Surroundings, &Surroundings), &Surroundings)| {
+        Surroundings::new(a.per, a.rows.iter().zip(&b.rows).zip(&c.rows).map(row).collect())
     };
     let log = |((a, b), c): ((&Vec<_>, &Vec<_>), &Vec<_>)| a.iter().zip(b).zip(c).map(one).collect();
     base.iter().zip(plain).zip(probed).map(log).collect()

@@ -179,17 +179,20 @@ pub(crate) fn way(h: f64) -> f64 {
     0.5 * h
 }
 
-/// Part of a step over which a servo acts whose error goes evenly from one value to another: switched by whole steps, it would
-/// rattle at the edge of its band as no servo does.
+/// Part of a step over which a servo acts whose error goes evenly from one value to another, and the mean error over that part:
+/// switched by whole steps, it would rattle at the edge of its band as no servo does.
 #[inline]
-fn acting_part(band: f64, from: f64, to: f64) -> f64 {
+fn acting_part(band: f64, from: f64, to: f64) -> (f64, f64) {
     let change = to - from;
     let acts = [from, to].map(|error| DeadBand::acts(band, error));
     if band == 0.0 || change == 0.0 || (acts == [true; 2] && from * to > 0.0) || acts == [false; 2] {
-        return f64::from(u8::from(acts[0]));
+        return (f64::from(u8::from(acts[0])), 0.5 * (from + to));
     }
     let [a, b] = [-band, band].map(|edge| ((edge - from) / change).clamp(0.0, 1.0));
-    1.0 - (b - a).abs()
+    let (entry, exit) = (a.min(b), a.max(b));
+    let part = entry + 1.0 - exit;
+    let sum = entry * (from + 0.5 * entry * change) + (1.0 - exit) * (to - 0.5 * (1.0 - exit) * change);
+    (part, sum / part.max(1e-300))
 }
 
 impl Law {
@@ -225,8 +228,8 @@ impl Law {
             Order::Follow(target, gain, more) => {
                 let error = target - q;
                 // A set point is the mean over the step.
-                let part = acting_part(p[Param::DeadBand as usize], error, error - 2.0 * gone);
-                (part * gain, part * (gain * error + more))
+                let (part, mean) = acting_part(p[Param::DeadBand as usize], error, error - 2.0 * gone);
+                (part * gain, part * (gain * (mean + gone) + more))
             }
         };
         let limit = p[Param::Limit as usize];
@@ -297,17 +300,17 @@ mod tests {
 
     #[test]
     fn a_servo_acts_for_the_part_of_a_step_that_lies_outside_its_dead_band() {
-        for (band, from, to, part) in [
-            (0.0, 0.1, -0.1, 1.0),
-            (1.0, 3.0, 2.0, 1.0),
-            (1.0, 0.5, -0.5, 0.0),
-            (1.0, 2.0, 0.0, 0.5),
-            (1.0, 0.0, -4.0, 0.75),
-            (1.0, 2.0, -2.0, 0.5),
-            (1.0, 0.3, 0.3, 0.0),
+        for (band, from, to, part, mean) in [
+            (0.0, 0.1, -0.3, 1.0, -0.1),
+            (1.0, 3.0, 2.0, 1.0, 2.5),
+            (1.0, 0.5, -0.5, 0.0, 0.0),
+            (1.0, 2.0, 0.0, 0.5, 1.5),
+            (1.0, 0.0, -4.0, 0.75, -2.5),
+            (1.0, 3.0, -2.0, 0.6, 5.0 / 6.0),
+            (1.0, 0.3, 0.3, 0.0, 0.3),
         ] {
             let found = acting_part(band, from, to);
-            assert!((found - part).abs() < 1e-12, "{band} {from} {to}: {found}");
+            assert!((found.0 - part).abs() < 1e-12 && (found.1 - mean).abs() < 1e-12, "{band} {from} {to}: {found:?}");
         }
     }
 }

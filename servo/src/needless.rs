@@ -172,7 +172,9 @@ impl Choice<'_> {
 
     /// Nats that a kind is worth where there can be no doubt of it; `None` where a fit without it must say.
     fn surely(&self, best: &Fit, kinds: &[Kind], kind: Kind, samples: f64, missing: &Missing) -> Option<f64> {
-        if !kind.is_linear() || kind == Kind::Bias || kinds.iter().any(|other| other.base() == Some(kind)) {
+        // Beside a limit or a dead band no kind is felt evenly.
+        let is_even = kind.is_linear() && !kinds.iter().any(|other| other.is_threshold());
+        if !is_even || kind == Kind::Bias || kinds.iter().any(|other| other.base() == Some(kind)) {
             return None;
         }
         let (loss, more) = self.clear_loss(best, &[kind], missing)?;

@@ -45,6 +45,14 @@ impl Chosen {
         let kinds = self.kinds.iter().map(|(kind, _)| *kind).filter(|kind| *kind != Kind::Delay || self.delay_is_free);
         From::Account(self.fit.law, kinds.collect())
     }
+
+    /// The same without its spring or play.
+    pub fn rigid(&self) -> From {
+        match &self.poorer {
+            Some(poorer) => From::Account(poorer.fit.law, poorer.kinds.clone()),
+            None => self.account(),
+        }
+    }
 }
 
 /// A choice that begins with what most servos have, and the kinds that it has to choose from.
@@ -79,6 +87,16 @@ pub enum From {
     Nothing,
     /// At an account that was found before, in other surroundings.
     Account(Law, Vec<Kind>),
+}
+
+impl From {
+    /// Its law, where it has one.
+    pub fn law(&self) -> Option<Law> {
+        match self {
+            From::Nothing => None,
+            From::Account(law, _) => Some(*law),
+        }
+    }
 }
 
 /// Finds what one joint has. Leaves the weights of its runs as the last fit had them.

@@ -71,23 +71,31 @@ pub fn diagnose(
     let (wholes, rivals) = find_wholes(model, &moved, &mut all, &mut chosen);
     let bodies: Vec<Effect> = wholes.iter().filter_map(|found| found.whole.effect(model, &found.values)).collect();
     let real = changed(model, &bodies).unwrap_or_else(|| model.clone());
-    // What jolts between samples did is no spring: the free run of the arm, which has those jolts, says so first.
-    drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
     for pass in 0..PASSES {
-        // One joint alone has no others whose motion it feels. Of a link that turns apart from its motor the encoder shows one
-        // side: what the log corrects of it is not told from what its motor does.
-        if all.len() == 1 || laws_of(&chosen).iter().flatten().any(Law::winds_up) {
+        // What jolts between samples did is no spring: the free run of the arm, which has those jolts, says so first. Of a link that
+        // turns apart from its motor the encoder shows one side, and what the log corrects of it is not told from what its motor
+        // does: it is looked at anew from its account without a spring, and joints that then have one stay as they are.
+        let rigid: Vec<From> = chosen.iter().map(|own| own.as_ref().map_or(From::Nothing, Chosen::rigid)).collect();
+        drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
+        let apart = laws_of(&chosen).iter().flatten().any(Law::winds_up);
+        // One joint alone has no others whose motion it feels.
+        if all.len() == 1 || (apart && pass > 0) {
             break;
         }
         // Once more, in surroundings by what was found of the others.
         progress("each joint beside what was found of the others", 0.7 + 0.05 * pass as f64);
-        let moved = motions(&real, &all, &laws_of(&chosen), episodes);
+        let begin = |(own, rigid): (&Option<Chosen>, From)| match own {
+            Some(own) if own.fit.law.winds_up() => rigid,
+            Some(own) => own.account(),
+            None => From::Nothing,
+        };
+        let accounts: Vec<From> = chosen.iter().zip(rigid).map(begin).collect();
+        let laws: Vec<Option<Law>> = accounts.iter().map(From::law).collect();
+        let moved = motions(&real, &all, &laws, episodes);
         surround(&mut all, &real, &moved);
-        let accounts: Vec<From> =
-            chosen.iter().map(|own| own.as_ref().map_or(From::Nothing, Chosen::account)).collect();
         chosen = choose_all(&mut all, &accounts);
-        drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
     }
+    drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
     findings.extend(
         all.iter()
             .filter(|joint| !joint.moved)

@@ -55,7 +55,7 @@ def run(name, folder, data, monkeypatch):
 
 
 #: What fails today, and why.
-FAILS = {"servo_arm": "dry friction of a stiff servo that carries nothing is taken for friction under load: issue 26"}
+FAILS = {}
 
 
 def marked(name):

@@ -3,8 +3,10 @@
 //! Each step solves (M/h + D) v⁺ = rhs − friction by sweeps over the joints, each joint with its own law and its own dry
 //! friction (projected Gauss–Seidel, as in Moreau's time stepping). Rows are in units of what each drive follows.
 
-use crate::law::{Law, Order, Param, Row};
+use crate::around::{FINE, Trace};
+use crate::law::{END, Law, Param, Row};
 use crate::prepare::Joint;
+use crate::simulate::{State, Tracer, order};
 use crate::wind_up::{Shaft, Wound};
 use gapscope_dynamics::{Data, Model};
 use nalgebra::DMatrix;
@@ -36,6 +38,33 @@ pub fn simulate_span(
     log: usize,
     span: Range<usize>,
 ) -> Vec<Vec<f64>> {
+    follow(model, laws, joints, log, span, f64::INFINITY, |_, _, _, _| {})
+}
+
+/// How laws move all joints along a log; `None` where a joint has no law, or where the arm flies off.
+pub fn trace_arm(model: &Model, laws: &[Option<Law>], joints: &[Joint], log: usize) -> Option<Vec<Option<Trace>>> {
+    let own: Vec<Law> = laws.iter().copied().collect::<Option<_>>()?;
+    let mut tracers: Vec<Tracer> =
+        own.iter().zip(joints).map(|(law, joint)| Tracer::new(law, &joint.runs[log])).collect();
+    let samples = joints.first().map_or(0, |joint| joint.runs[log].time.len());
+    let path = follow(model, laws, joints, log, 0..samples, FINE, |j, span, before, after| {
+        tracers[j].see(span, before, after)
+    });
+    let sound = path.iter().flatten().all(|q| q.is_finite());
+    let finished = tracers.into_iter().zip(joints).zip(path);
+    sound.then(|| finished.map(|((tracer, joint), shown)| Some(tracer.finish(&joint.runs[log], shown))).collect())
+}
+
+/// Simulates by steps of at most `longest` s; `see` is told of each step of each joint: where it lies, in samples, and the link's state before and after it.
+fn follow(
+    model: &Model,
+    laws: &[Option<Law>],
+    joints: &[Joint],
+    log: usize,
+    span: Range<usize>,
+    longest: f64,
+    mut see: impl FnMut(usize, [f64; 2], State, State),
+) -> Vec<Vec<f64>> {
     let n = model.dof();
     if span.is_empty() {
         return vec![Vec::new(); n];
@@ -56,8 +85,7 @@ pub fn simulate_span(
     let mut q: Vec<f64> = start.iter().map(|start| start.0).collect();
     let mut v: Vec<f64> = start.iter().map(|start| start.1).collect();
     let mut path: Vec<Vec<f64>> = q.iter().map(|&q| vec![q]).collect();
-    let [mut turned, mut bias, mut end, mut load, mut push, mut factor, mut bound, mut delivered] =
-        std::array::from_fn(|_| vec![0.0; n]);
+    let [mut turned, mut bias, mut end, mut push, mut factor, mut ends] = std::array::from_fn(|_| vec![0.0; n]);
     let mut hints = vec![0; n];
     let shafts: Vec<Option<Shaft>> =
         (0..n).map(|j| laws[j].and_then(|law| law.shaft(joints[j].runs[log].mass))).collect();
@@ -79,7 +107,7 @@ pub fn simulate_span(
     for (q, state) in q.iter_mut().zip(&wound) {
         *q = state.map_or(*q, |state| state.link[0]);
     }
-    let step = joints.iter().map(|joint| joint.runs[log].step).fold(f64::INFINITY, f64::min);
+    let step = joints.iter().map(|joint| joint.runs[log].step).fold(longest, f64::min);
     for k in first..span.end - 1 {
         let dt = time[k + 1] - time[k];
         let parts = (dt / step - 1e-6).ceil().max(1.0);
@@ -94,29 +122,22 @@ pub fn simulate_span(
             for j in 0..n {
                 let run = &joints[j].runs[log];
                 let law = laws[j].unwrap_or(bare);
-                let order = match (run.on[k], &run.target, &run.delivered) {
-                    (false, _, _) | (true, None, None) => Order::Off,
-                    (true, Some(target), _) => {
-                        let mean = target.mean(t - law[Param::Latency], h, &mut hints[j]);
-                        Order::Follow(mean, law[Param::Feedback] * run.gain)
-                    }
-                    (true, None, Some(w)) => Order::Deliver(w.mean(t - law[Param::Latency], h, &mut hints[j])),
-                };
+                let order = order(&law, run, k, t, h, &mut hints[j]);
                 let sigma = law[Param::Scale];
                 let carried: f64 = (0..n).map(|i| mass[(j, i)] * v[i]).sum();
                 if let Some(state) = &wound[j] {
-                    let row = law.row(h, shown(state, &law), state.motor[1], order, load[j]);
-                    load[j] = row.torque;
+                    let row = law.row(h, shown(state, &law), state.motor[1], order, 0.0);
                     rows[j] = Some(row);
                     push[j] = sigma * (carried / h - bias[j]);
                     factor[j] = sigma * mass[(j, j)] / h;
-                    end[j] = v[j];
+                    (end[j], ends[j]) = (v[j], END);
                     continue;
                 }
-                let row = law.row(h, q[j], v[j], order, load[j]);
+                let row = law.row(h, q[j], v[j], order, sigma * mass[(j, j)] / h);
+                ends[j] = row.end;
                 push[j] = row.push + sigma * (carried / h - bias[j]);
                 factor[j] = row.factor + sigma * mass[(j, j)] / h;
-                (bound[j], delivered[j], load[j]) = (row.bound, row.delivered, row.torque);
+                rows[j] = Some(row);
                 end[j] = v[j];
                 if laws[j].is_none()
                     && run.on[k]
@@ -136,13 +157,15 @@ pub fn simulate_span(
                     let speed = match (&shafts[j], &wound[j], &rows[j]) {
                         (Some(shaft), Some(state), Some(row)) => {
                             let mut there = *state;
+                            let motor = state.motor[1];
                             shaft.step(h, &mut there, row, factor[j], rest, |factor, push| {
-                                law.settle(factor, push, row.bound, row.delivered)
+                                law.settle(row, motor, factor, push)
                             });
                             next[j] = Some(there);
                             there.link[1]
                         }
-                        _ => law.settle(factor[j], rest, bound[j], delivered[j]),
+                        (_, _, Some(row)) => law.settle(row, v[j], factor[j], rest),
+                        _ => end[j],
                     };
                     change = change.max((speed - end[j]).abs());
                     end[j] = speed;
@@ -154,8 +177,11 @@ pub fn simulate_span(
             }
             wound.copy_from_slice(&next);
             for j in 0..n {
-                q[j] = if factor[j].is_nan() { q[j] + h * end[j] } else { Law::move_on(h, q[j], v[j], end[j]) };
+                let before = (q[j], v[j]);
+                q[j] =
+                    if factor[j].is_nan() { q[j] + h * end[j] } else { Law::move_on(h, ends[j], q[j], v[j], end[j]) };
                 v[j] = end[j];
+                see(j, [part, part + 1].map(|part| k as f64 + part as f64 / parts), before, (q[j], v[j]));
             }
         }
         let sound = q.iter().all(|q| q.is_finite() && q.abs() < 1e6);

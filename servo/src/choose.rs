@@ -3,7 +3,7 @@
 use crate::choice::{Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
 use crate::fit::{Fit, fit};
 use crate::kinds::Kind;
-use crate::law::Param;
+use crate::law::{Law, Param};
 use crate::needless::{drop_needless, exchange, ties};
 use crate::prepare::Joint;
 use crate::run::Signal;
@@ -34,10 +34,29 @@ pub struct Chosen {
     pub samples: f64,
     /// The account without its spring or play, where it has one.
     pub poorer: Option<Poorer>,
+    /// Whether a delay is a kind of the account, and no name for the latency of its drive.
+    delay_is_free: bool,
 }
 
-/// Finds what one joint has. Leaves the weights of its runs as the last fit had them.
-pub fn choose(joint: &mut Joint) -> Chosen {
+impl Chosen {
+    /// The account, to begin another choice with.
+    pub fn account(&self) -> From {
+        // A latency is a part of the drive, whether it is told as a delay or not.
+        let kinds = self.kinds.iter().map(|(kind, _)| *kind).filter(|kind| *kind != Kind::Delay || self.delay_is_free);
+        From::Account(self.fit.law, kinds.collect())
+    }
+
+    /// The same without its spring or play.
+    pub fn rigid(&self) -> From {
+        match &self.poorer {
+            Some(poorer) => From::Account(poorer.fit.law, poorer.kinds.clone()),
+            None => self.account(),
+        }
+    }
+}
+
+/// A choice that begins with what most servos have, and the kinds that it has to choose from.
+fn begin(joint: &mut Joint) -> (Choice<'_>, Vec<Kind>, Vec<Kind>) {
     let given = joint.given;
     let mut base: Vec<Param> = [Param::Scale, Param::Damping].into_iter().filter(|p| !given[*p as usize]).collect();
     let closed = joint.runs.iter().any(|run| run.target.is_some());
@@ -51,16 +70,48 @@ pub fn choose(joint: &mut Joint) -> Chosen {
         }
     }
     let possible: Vec<Kind> = Kind::ALL.into_iter().filter(|&kind| is_possible(joint, kind, closed)).collect();
-    let mut choice = Choice { joint, base, perfect: 0.0, bare: law };
     // What most servos have stands in from the beginning: beside each other these show, and each hides behind the rest's lack.
-    let mut kinds: Vec<Kind> = USUAL.into_iter().filter(|kind| possible.contains(kind)).collect();
+    let kinds: Vec<Kind> = USUAL.into_iter().filter(|kind| possible.contains(kind)).collect();
     for (param, _, _) in kinds.iter().flat_map(|kind| kind.parameters()) {
-        law[*param] = 0.1 * choice.joint.ranges.scale[*param as usize];
+        law[*param] = 0.1 * joint.ranges.scale[*param as usize];
     }
     law[Param::Bias] = 0.0;
-    choice.bare = law;
+    (Choice { joint, base, perfect: 0.0, bare: law }, kinds, possible)
+}
+
+/// Where a choice begins.
+#[derive(Debug, Clone, Default)]
+pub enum From {
+    /// At nothing.
+    #[default]
+    Nothing,
+    /// At an account that was found before, in other surroundings.
+    Account(Law, Vec<Kind>),
+}
+
+impl From {
+    /// Its law, where it has one.
+    pub fn law(&self) -> Option<Law> {
+        match self {
+            From::Nothing => None,
+            From::Account(law, _) => Some(*law),
+        }
+    }
+}
+
+/// Finds what one joint has. Leaves the weights of its runs as the last fit had them.
+pub fn choose(joint: &mut Joint, from: &From) -> Chosen {
+    let given = joint.given;
+    let (mut choice, mut kinds, possible) = begin(joint);
     let mut why = Vec::new();
-    let mut best = choice.fit(&law, &kinds, None, FULL);
+    let start = match from {
+        From::Nothing => choice.bare,
+        From::Account(law, own) => {
+            kinds.clone_from(own);
+            *law
+        }
+    };
+    let mut best = choice.fit(&start, &kinds, None, FULL);
     let usual = kinds.len();
     loop {
         choice.weigh(&best.law);
@@ -96,6 +147,7 @@ pub fn choose(joint: &mut Joint) -> Chosen {
     }
     let ties = ties(&choice, &kinds, &best, &possible);
     let samples = independent(choice.joint, &best.errors);
+    let delay_is_free = kinds.contains(&Kind::Delay);
     let mut found = kept;
     let joint = choice.joint;
     // A latency of the drive that shows beyond the logger's own order is a delay to any simulator without one.
@@ -115,7 +167,7 @@ pub fn choose(joint: &mut Joint) -> Chosen {
         }
     }
     let unclaimed = found.iter().map(|f| f.0).filter(|kind| kind.needs_given() && !is_given(joint, *kind)).collect();
-    Chosen { fit: best, kinds: found, unclaimed, ties, why, samples, poorer }
+    Chosen { fit: best, kinds: found, unclaimed, ties, why, samples, poorer, delay_is_free }
 }
 
 /// Whether a kind can be asked for at all.
@@ -128,6 +180,7 @@ fn is_possible(joint: &Joint, kind: Kind, closed: bool) -> bool {
         Kind::Delay => given && closed,
         Kind::DeadBand => closed && given,
         Kind::SpeedLimit => closed,
+        Kind::Feedforward => closed && !given,
         Kind::Saturation => !given && closed,
         Kind::Elasticity | Kind::Backlash => closed,
         // Gravity must show, or an offset of the encoder is nothing to the joint.

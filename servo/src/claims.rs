@@ -191,6 +191,7 @@ pub fn drive(
     let names = [
         (Param::Scale, scale_name),
         (Param::Damping, "damping"),
+        (Param::Feedforward, "feedforward"),
         (Param::Latency, "latency"),
         (Param::Limit, "limit"),
         (Param::Speed, "speed_limit"),
@@ -209,7 +210,7 @@ pub fn drive(
             }
             let estimate = match param {
                 Param::Scale => Estimate::new(spread.scale(sigma), &format!("N m/{}", joint.signal.unit())),
-                Param::Damping => {
+                Param::Damping | Param::Feedforward => {
                     Estimate::new(spread.torque(param, law[param], sigma), &unit_of("N m s/rad", joint.signal, known))
                 }
                 Param::Limit => Estimate::new(spread.plain(param, law[param]), joint.signal.unit()),

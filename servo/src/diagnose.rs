@@ -1,8 +1,9 @@
 //! The diagnosis of a servo arm: joint by joint what drives it and which effects it has, then how far the whole arm's free run
 //! is from the logs before and after.
 
-use crate::arm::simulate_arm;
-use crate::choose::{Chosen, choose};
+use crate::arm::{simulate_arm, trace_arm};
+use crate::around::{Motion, motion};
+use crate::choose::{Chosen, From, choose};
 use crate::claims::{confidence, drive, effects, reasons, whole_effect};
 use crate::clock::nominal_rate;
 use crate::evidence::Evidence;
@@ -16,6 +17,7 @@ use crate::model::{ServoModel, ServoModelError};
 use crate::prepare::{Joint, joints};
 use crate::rest;
 use crate::schema::*;
+use crate::simulate::trace;
 use crate::together::{drop_what_the_arm_does_not_miss, is_missed};
 use crate::whole::{Found, Whole, changed, look, surround};
 use gapscope_datasets::Episode;
@@ -26,6 +28,9 @@ use rayon::prelude::*;
 /// Part of the squared gap up to which what is left is nothing, and up to which it is a part.
 const EXPLAINED: f64 = 0.15;
 const PARTLY: f64 = 0.6;
+/// How often each joint is looked at anew, in surroundings by what was found of the others: the first time by laws that were found
+/// beside the measured motion.
+const PASSES: usize = 2;
 /// Steps of a fit with a fold left out: it begins where the whole fit ended.
 const FOLD: usize = 8;
 
@@ -58,11 +63,38 @@ pub fn diagnose(
     let mut all = joints(model, episodes, given);
     let excited = all.iter().any(|joint| joint.moved);
     progress("what drives each joint", 0.1);
-    let mut chosen = choose_all(&mut all);
-    progress("what the whole arm has", 0.6);
-    let (wholes, rivals) = find_wholes(model, episodes, &mut all, &mut chosen);
+    let nothing = vec![From::Nothing; all.len()];
+    let mut chosen = choose_all(&mut all, &nothing);
+    progress("what the whole arm has", 0.5);
+    // The search goes by what was measured: an arm without the effect moves otherwise than the one that has it.
+    let moved = motions(model, &all, &vec![None; all.len()], episodes);
+    let (wholes, rivals) = find_wholes(model, &moved, &mut all, &mut chosen);
     let bodies: Vec<Effect> = wholes.iter().filter_map(|found| found.whole.effect(model, &found.values)).collect();
     let real = changed(model, &bodies).unwrap_or_else(|| model.clone());
+    for pass in 0..PASSES {
+        // What jolts between samples did is no spring: the free run of the arm, which has those jolts, says so first. Of a link that
+        // turns apart from its motor the encoder shows one side, and what the log corrects of it is not told from what its motor
+        // does: it is looked at anew from its account without a spring, and joints that then have one stay as they are.
+        let rigid: Vec<From> = chosen.iter().map(|own| own.as_ref().map_or(From::Nothing, Chosen::rigid)).collect();
+        drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
+        let apart = laws_of(&chosen).iter().flatten().any(Law::winds_up);
+        // One joint alone has no others whose motion it feels.
+        if all.len() == 1 || (apart && pass > 0) {
+            break;
+        }
+        // Once more, in surroundings by what was found of the others.
+        progress("each joint beside what was found of the others", 0.7 + 0.05 * pass as f64);
+        let begin = |(own, rigid): (&Option<Chosen>, From)| match own {
+            Some(own) if own.fit.law.winds_up() => rigid,
+            Some(own) => own.account(),
+            None => From::Nothing,
+        };
+        let accounts: Vec<From> = chosen.iter().zip(rigid).map(begin).collect();
+        let laws: Vec<Option<Law>> = accounts.iter().map(From::law).collect();
+        let moved = motions(&real, &all, &laws, episodes);
+        surround(&mut all, &real, &moved);
+        chosen = choose_all(&mut all, &accounts);
+    }
     drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
     findings.extend(
         all.iter()
@@ -79,7 +111,8 @@ pub fn diagnose(
     let (nominal, known) = nominal_laws(&all);
     let before = run_free(model, &nominal, &all);
     let after = held_out(&real, &laws, &chosen, &all);
-    let spreads: Vec<Option<Spread>> = chosen.iter().map(|c| c.as_ref().map(|c| Spread::of(&c.fit))).collect();
+    let spreads: Vec<Option<Spread>> =
+        chosen.iter().zip(&all).map(|(c, joint)| c.as_ref().map(|c| Spread::of(&c.fit, joint))).collect();
     let floor: PerJoint = all.iter().map(|j| (j.name.clone(), j.encoder_step() / 12f64.sqrt())).collect();
     let logs = |errors: &'_ Errors| -> Vec<Vec<Vec<f64>>> { errors.clone() };
     let (before_logs, after_logs) = (logs(&before), logs(&after));
@@ -149,35 +182,51 @@ pub fn diagnose(
 /// Constants that an effect of the whole arm may be behind.
 const CONSTANT: [Kind; 2] = [Kind::Bias, Kind::Offset];
 
-fn choose_all(joints: &mut [Joint]) -> Vec<Option<Chosen>> {
-    joints.par_iter_mut().map(|joint| joint.moved.then(|| choose(joint))).collect()
+fn choose_all(joints: &mut [Joint], from: &[From]) -> Vec<Option<Chosen>> {
+    joints.par_iter_mut().zip(from).map(|(joint, from)| joint.moved.then(|| choose(joint, from))).collect()
+}
+
+fn laws_of(chosen: &[Option<Chosen>]) -> Vec<Option<Law>> {
+    chosen.iter().map(|own| own.as_ref().map(|own| own.fit.law)).collect()
+}
+
+/// How the arm moved along each log, by what is known of its joints.
+fn motions(model: &Model, joints: &[Joint], laws: &[Option<Law>], episodes: &[Episode]) -> Vec<Motion> {
+    let one = |(log, episode): (usize, &Episode)| {
+        // All at once they jolt each other as they should; one by one where the arm as a whole cannot be followed.
+        let apart =
+            || joints.iter().zip(laws).map(|(joint, law)| law.map(|law| trace(&law, &joint.runs[log]))).collect();
+        let traces: Vec<_> = trace_arm(model, laws, joints, log).unwrap_or_else(apart);
+        motion(episode, &joints[0].runs[log].stale, &traces)
+    };
+    episodes.par_iter().enumerate().map(one).collect()
 }
 
 /// Effects of the whole arm, likeliest first, with each joint chosen anew beside them; and those that could stand in the
 /// place of biases and offsets. Leaves the joints in the surroundings of the arm that has them.
 fn find_wholes(
     model: &Model,
-    episodes: &[Episode],
+    moved: &[Motion],
     joints: &mut [Joint],
     chosen: &mut Vec<Option<Chosen>>,
 ) -> (Vec<Found>, Vec<Whole>) {
     let (mut real, mut found) = (model.clone(), Vec::<Found>::new());
     loop {
         let taken: Vec<Whole> = found.iter().map(|found| found.whole).collect();
-        let looked = look(&real, episodes, joints, chosen, &taken);
+        let looked = look(&real, moved, joints, chosen, &taken);
         let Some(next) = looked.found else { return (found, looked.ties) };
         let Some(there) =
             next.whole.effect(&real, &next.values).and_then(|effect| changed(&real, std::slice::from_ref(&effect)))
         else {
             return (found, looked.ties);
         };
-        let before: Vec<Option<Law>> = chosen.iter().map(|c| c.as_ref().map(|c| c.fit.law)).collect();
+        let before = laws_of(chosen);
         if !is_missed(joints, (&there, &next.laws), (&real, &before)) {
             return (found, looked.ties);
         }
         real = there;
-        surround(joints, &real, episodes);
-        *chosen = choose_all(joints);
+        surround(joints, &real, moved);
+        *chosen = choose_all(joints, &vec![From::Nothing; joints.len()]);
         found.push(next);
     }
 }

@@ -122,7 +122,7 @@ fn of_joint(errors: &Errors, joint: &Joint, j: usize) -> Vec<Regime> {
                 turning[k],
                 v > still && v <= joint.sizes.speed && !turning[k],
                 v > joint.sizes.speed && !turning[k],
-                heavy > 1e-3 && run.around.gravity[k].abs() > 1.2 * heavy,
+                heavy > 1e-3 && run.around.at(k).gravity.abs() > 1.2 * heavy,
             ];
             let block = k / length;
             let add = |sum: &mut (f64, f64)| *sum = (sum.0 + square, sum.1 + 1.0);

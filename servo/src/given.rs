@@ -35,6 +35,8 @@ pub struct Constants {
     pub stiffness: Option<Known>,
     /// Torque per speed, N m s/rad.
     pub damping: Option<Known>,
+    /// Torque per speed of the set point, N m s/rad; the damping where that acts on the error.
+    pub feedforward: Option<Known>,
     /// N m/A.
     pub torque_constant: Option<Known>,
     /// Ω.
@@ -64,7 +66,7 @@ pub struct Given {
 pub enum GivenError {
     /// Not TOML, or not of this shape.
     #[error(
-        "not a description of drives: {0}; keys are gain, stiffness, damping, torque_constant, resistance, voltage_limit, torque_limit, speed_limit, latency, dead_band, alone or under [joint.NAME] or [log.\"PATTERN\"]"
+        "not a description of drives: {0}; keys are gain, stiffness, damping, feedforward, torque_constant, resistance, voltage_limit, torque_limit, speed_limit, latency, dead_band, alone or under [joint.NAME] or [log.\"PATTERN\"]"
     )]
     Unreadable(String),
     /// A joint that the robot does not have.
@@ -91,6 +93,7 @@ impl Constants {
             gain: self.gain.or(other.gain),
             stiffness: self.stiffness.or(other.stiffness),
             damping: self.damping.or(other.damping),
+            feedforward: self.feedforward.or(other.feedforward),
             torque_constant: self.torque_constant.or(other.torque_constant),
             resistance: self.resistance.or(other.resistance),
             voltage_limit: self.voltage_limit.or(other.voltage_limit),
@@ -106,6 +109,7 @@ impl Constants {
             ("gain", self.gain.map(Known::Value)),
             ("stiffness", self.stiffness),
             ("damping", self.damping),
+            ("feedforward", self.feedforward),
             ("torque_constant", self.torque_constant),
             ("resistance", self.resistance),
             ("voltage_limit", self.voltage_limit),
@@ -115,7 +119,7 @@ impl Constants {
             ("dead_band", self.dead_band),
         ];
         for (key, known) in all {
-            let zero = matches!(key, "damping" | "latency" | "dead_band");
+            let zero = matches!(key, "damping" | "feedforward" | "latency" | "dead_band");
             let fine = |x: f64| x.is_finite() && (x > 0.0 || zero && x == 0.0);
             let value = match known {
                 None => continue,
@@ -177,7 +181,9 @@ impl Constants {
             joint.put(param, known.ends());
         }
         let Some([least, greatest]) = sigma else { return };
-        for (param, known) in [(Param::Damping, self.damping), (Param::Limit, self.torque_limit)] {
+        for (param, known) in
+            [(Param::Damping, self.damping), (Param::Feedforward, self.feedforward), (Param::Limit, self.torque_limit)]
+        {
             let Some(known) = known else { continue };
             let [a, b] = known.ends();
             joint.put(param, [a * least, b * greatest]);

@@ -38,11 +38,14 @@ pub enum Kind {
     Elasticity,
     /// Play between motor and link.
     Backlash,
+    /// The drive answers to the set point's speed: a derivative gain on the error. A part of a drive that nobody gave, and never
+    /// an effect.
+    Feedforward,
 }
 
 impl Kind {
     /// All, in the order in which they are tried.
-    pub const ALL: [Kind; 16] = [
+    pub const ALL: [Kind; 17] = [
         Kind::Coulomb,
         Kind::Load,
         Kind::Stribeck,
@@ -59,6 +62,7 @@ impl Kind {
         Kind::DeadBand,
         Kind::Elasticity,
         Kind::Backlash,
+        Kind::Feedforward,
     ];
 
     /// Public name.
@@ -80,6 +84,7 @@ impl Kind {
             Kind::DeadBand => "dead_band",
             Kind::Elasticity => "joint_elasticity",
             Kind::Backlash => "backlash",
+            Kind::Feedforward => "feedforward",
         }
     }
 
@@ -106,12 +111,13 @@ impl Kind {
             Kind::DeadBand => &[(Param::DeadBand, "width", "rad")],
             Kind::Elasticity => &[(Param::Spring, "stiffness", "N m/rad"), (Param::Armature, "rotor", "kg m²")],
             Kind::Backlash => &[(Param::Gap, "gap", "rad"), (Param::Armature, "rotor", "kg m²")],
+            Kind::Feedforward => &[(Param::Feedforward, "feedforward", "N m s/rad")],
         }
     }
 
     /// Whether it exists only against a given value.
     pub fn needs_given(self) -> bool {
-        matches!(self, Kind::GainError | Kind::DampingError | Kind::SpeedLimit | Kind::DeadBand)
+        matches!(self, Kind::GainError | Kind::DampingError | Kind::SpeedLimit | Kind::DeadBand | Kind::Feedforward)
     }
 
     /// Nats that the logs must give for it beyond its parameters: none for what every used robot has, three for the rest, as
@@ -133,6 +139,7 @@ impl Kind {
             // 3, 5 and 8 Hz.
             Kind::Elasticity => &[0.5, 0.83, 1.3],
             Kind::Backlash => &[1.0, 3.0],
+            Kind::Feedforward => &[0.5, 1.0],
             _ => &[0.1],
         }
     }
@@ -145,6 +152,15 @@ impl Kind {
             let rotor = 0.5 * law[Param::Scale] * inertia;
             law[Param::Armature] = law[Param::Armature].max(rotor);
             law[Param::Spring] = CONTACT;
+        }
+        if self == Kind::Feedforward {
+            // A derivative gain on the error, at so many times critical damping.
+            let critical = 2.0 * (law[Param::Feedback] * law[Param::Scale] * inertia).sqrt();
+            law[Param::Feedforward] = start * critical;
+            if !given[Param::Damping as usize] {
+                law[Param::Damping] = start * critical;
+            }
+            return;
         }
         let starts = |param: Param| self.is_threshold() || !given[param as usize];
         for &(param, _, _) in self.parameters().iter().filter(|(param, _, _)| starts(*param)) {
@@ -189,9 +205,16 @@ impl Kind {
         matches!(self, Kind::Saturation | Kind::SpeedLimit | Kind::DeadBand | Kind::Elasticity | Kind::Backlash)
     }
 
-    /// Whether friction stands in for it in a fit that has friction before: both slow a joint down.
+    /// Whether the law is linear in all that it frees, so that a fit without it loses what a parabola says. Friction under load
+    /// scales all else that a drive does: without it the same motion is another drive's.
+    pub fn is_linear(self) -> bool {
+        matches!(self, Kind::Coulomb | Kind::Viscous | Kind::Armature | Kind::Bias | Kind::DampingError)
+    }
+
+    /// Whether others stand in for it in a fit that has them before: friction for limits, which slow a joint down as well, and an
+    /// early set point for one whose speed the drive knows.
     pub fn hides(self) -> bool {
-        matches!(self, Kind::Saturation | Kind::SpeedLimit)
+        matches!(self, Kind::Saturation | Kind::SpeedLimit | Kind::Feedforward)
     }
 
     /// Whether motor and link turn apart by it.

@@ -5,6 +5,8 @@
 //!
 //! w = σ (M q̈ + c + g(q − ζ)) + α q̈ + (β·on + ν) q̇ + friction − δ,   σ = 1/s,
 //!
+//! where w of a set point u is its error with λ u̇ on top: a derivative gain on the error is β = λ.
+//!
 //! linear in all that a log may or may not determine: where gravity and the bodies' inertia do not show, σ goes to zero and the
 //! ratios stay. Friction is set-valued at rest, and its bound is φ + ρ e^{−(q̇/v)²} + (μ + μ_s e^{−(q̇/v)²}) abs(w).
 //! Source of the friction with load: Duclusaud, Passault, Padois, Ly, "Extended friction models for the physics simulation of
@@ -52,10 +54,12 @@ pub enum Param {
     Spring,
     /// Play between motor and link, rad.
     Gap,
+    /// λ, unit of w per rad/s of the set point: a derivative gain that acts on the error, or a feed-forward of speed.
+    Feedforward,
 }
 
 /// How many parameters a law has.
-pub const PARAMS: usize = 18;
+pub const PARAMS: usize = 19;
 
 impl Param {
     /// All, in the order of [`Law::values`].
@@ -78,6 +82,7 @@ impl Param {
         Param::Feedback,
         Param::Spring,
         Param::Gap,
+        Param::Feedforward,
     ];
 
     /// Whether its unit is that of w over something, so that 1/σ makes a torque of it.
@@ -91,6 +96,7 @@ impl Param {
                 | Param::Rise
                 | Param::Bias
                 | Param::Limit
+                | Param::Feedforward
         )
     }
 }
@@ -130,15 +136,23 @@ impl std::ops::IndexMut<Param> for Law {
     }
 }
 
-/// Weight of a step's end in the implicit rule: at one half it is of second order and rings where inertia is next to nothing;
-/// this loses a tenth of a step of phase and damps by a third a step.
+/// Weight of a step's end in the implicit rule where inertia is next to nothing: at one half the rule is of second order and rings
+/// there; this loses a tenth of a step of phase and damps by a third a step.
 pub(crate) const END: f64 = 0.6;
+
+/// Weight of a step's end for an inertia and a drag, both as factors of speed: one half, unless that would ring by more than a
+/// rule with [`END`] does. A tenth of a step of phase is an inertia of a tenth of a step times the damping: more than many rotors.
+#[inline]
+pub(crate) fn end_weight(inertia: f64, drag: f64) -> f64 {
+    let light = (END - 0.5) * drag;
+    if inertia >= light { 0.5 } else { END - inertia / drag }
+}
 
 /// What a drive is told over a step.
 #[derive(Debug, Clone, Copy)]
 pub enum Order {
-    /// Follow a set point (rad), mean over the step, with a gain (unit of w per rad).
-    Follow(f64, f64),
+    /// Follow a set point (rad), mean over the step, with a gain (unit of w per rad), and w on top of what its error asks for.
+    Follow(f64, f64, f64),
     /// Deliver w.
     Deliver(f64),
     /// Motor off.
@@ -152,17 +166,33 @@ pub struct Row {
     pub factor: f64,
     /// Right-hand side, without σ(M v/h − c − g).
     pub push: f64,
-    /// Bound of dry friction.
-    pub bound: f64,
     /// w that is delivered if the joint stays where it is.
     pub delivered: f64,
-    /// The same less what damping takes, at the speed where the step begins.
-    pub torque: f64,
+    /// By how much less is delivered in the middle of the step for each rad/s on its way.
+    pub yields: f64,
+    /// Weight of the step's end.
+    pub end: f64,
 }
 
 /// Part of a step at the end of which the position enters the feedback: half of the way that the step makes.
 pub(crate) fn way(h: f64) -> f64 {
     0.5 * h
+}
+
+/// Part of a step over which a servo acts whose error goes evenly from one value to another, and the mean error over that part:
+/// switched by whole steps, it would rattle at the edge of its band as no servo does.
+#[inline]
+fn acting_part(band: f64, from: f64, to: f64) -> (f64, f64) {
+    let change = to - from;
+    let acts = [from, to].map(|error| DeadBand::acts(band, error));
+    if band == 0.0 || change == 0.0 || (acts == [true; 2] && from * to > 0.0) || acts == [false; 2] {
+        return (f64::from(u8::from(acts[0])), 0.5 * (from + to));
+    }
+    let [a, b] = [-band, band].map(|edge| ((edge - from) / change).clamp(0.0, 1.0));
+    let (entry, exit) = (a.min(b), a.max(b));
+    let part = entry + 1.0 - exit;
+    let sum = entry * (from + 0.5 * entry * change) + (1.0 - exit) * (to - 0.5 * (1.0 - exit) * change);
+    (part, sum / part.max(1e-300))
 }
 
 impl Law {
@@ -181,57 +211,106 @@ impl Law {
     }
 
     /// Position at the end of a step, rad.
-    pub fn move_on(h: f64, q: f64, v: f64, v_end: f64) -> f64 {
-        q + h * ((1.0 - END) * v + END * v_end)
+    pub fn move_on(h: f64, end: f64, q: f64, v: f64, v_end: f64) -> f64 {
+        q + h * ((1.0 - end) * v + end * v_end)
     }
 
-    /// The row of a step of `h` s from (q, v) under an order; `load` is the w delivered in the step before.
-    #[inline]
-    pub fn row(&self, h: f64, q: f64, v: f64, order: Order, load: f64) -> Row {
+    /// The row of a step of `h` s from (q, v) under an order; `inertia` is σM/h of what turns with the motor.
+    #[inline(always)]
+    pub fn row(&self, h: f64, q: f64, v: f64, order: Order, inertia: f64) -> Row {
         let p = &self.values;
         let damping =
             p[Param::Viscous as usize] + if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] };
+        let gone = way(h) * v;
         let (mut stiffness, mut w) = match order {
             Order::Off => (0.0, 0.0),
             Order::Deliver(w) => (0.0, w),
-            Order::Follow(target, gain) => {
+            Order::Follow(target, gain, more) => {
                 let error = target - q;
-                if DeadBand::acts(p[Param::DeadBand as usize], error) { (gain, gain * error) } else { (0.0, 0.0) }
+                // A set point is the mean over the step.
+                let (part, mean) = acting_part(p[Param::DeadBand as usize], error, error - 2.0 * gone);
+                (part * gain, part * (gain * (mean + gone) + more))
             }
         };
         let limit = p[Param::Limit as usize];
-        if w.abs() > limit {
-            (stiffness, w) = (0.0, limit.copysign(w));
+        let middle = w - stiffness * gone;
+        if middle.abs() > limit {
+            (stiffness, w) = (0.0, limit.copysign(middle));
         }
         let drag = stiffness * way(h) + damping;
         let armature = p[Param::Armature as usize] / h;
-        let mut bound = p[Param::Coulomb as usize];
+        let end = end_weight(inertia + armature, drag);
+        Row {
+            factor: armature + end * drag,
+            push: armature * v + w + p[Param::Bias as usize] - (1.0 - end) * drag * v,
+            delivered: w,
+            yields: 0.5 * h * stiffness + if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] },
+            end,
+        }
+    }
+
+    /// Bound of dry friction over a step whose mean speed is `speed`.
+    #[inline(always)]
+    pub fn bound(&self, row: &Row, speed: f64) -> f64 {
+        let p = &self.values;
+        let (mut bound, mut loaded) = (p[Param::Coulomb as usize], p[Param::Load as usize]);
         let (rise, load_rise) = (p[Param::Rise as usize], p[Param::LoadRise as usize]);
-        let mut loaded = p[Param::Load as usize];
         if rise > 0.0 || load_rise > 0.0 {
-            let ratio = v / p[Param::StribeckVelocity as usize];
+            let ratio = speed / p[Param::StribeckVelocity as usize];
             let fade = (-ratio * ratio).exp();
             bound += rise * fade;
             loaded += load_rise * fade;
         }
-        bound += loaded * load.abs();
-        Row {
-            factor: armature + END * drag,
-            push: armature * v + w + p[Param::Bias as usize] - (1.0 - END) * drag * v,
-            bound,
-            delivered: w,
-            torque: w - if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] * v },
-        }
+        bound + loaded * (row.delivered - row.yields * speed).abs()
     }
 
-    /// Speed at the end of a step from the whole factor and push of a row.
+    /// Whether friction changes with speed or load.
     #[inline]
-    pub fn settle(&self, factor: f64, push: f64, bound: f64, delivered: f64) -> f64 {
+    pub fn is_friction_plain(&self) -> bool {
+        let p = &self.values;
+        p[Param::Load as usize] == 0.0 && p[Param::LoadRise as usize] == 0.0 && p[Param::Rise as usize] == 0.0
+    }
+
+    /// Speed at the end of a step that begins at `v`, from the whole factor and push of a row. Friction that changes with speed or
+    /// load is that of the middle of the step: where it begins, friction would lag by half a step.
+    #[inline(always)]
+    pub fn settle(&self, row: &Row, v: f64, factor: f64, push: f64) -> f64 {
+        let end = self.settle_at(factor, push, self.bound(row, v), row.delivered);
+        if self.is_friction_plain() {
+            return end;
+        }
+        self.settle_at(factor, push, self.bound(row, 0.5 * (v + end)), row.delivered)
+    }
+
+    /// Speed at the end of a step under a bound of friction.
+    #[inline(always)]
+    fn settle_at(&self, factor: f64, push: f64, bound: f64, delivered: f64) -> f64 {
         if push.abs() <= bound {
             return 0.0;
         }
         let end = (push - bound.copysign(push)) / factor;
         let without = || (push - delivered - bound.copysign(push)) / factor;
         SpeedLimit::speed(end, delivered, self.values[Param::Speed as usize], without)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_servo_acts_for_the_part_of_a_step_that_lies_outside_its_dead_band() {
+        for (band, from, to, part, mean) in [
+            (0.0, 0.1, -0.3, 1.0, -0.1),
+            (1.0, 3.0, 2.0, 1.0, 2.5),
+            (1.0, 0.5, -0.5, 0.0, 0.0),
+            (1.0, 2.0, 0.0, 0.5, 1.5),
+            (1.0, 0.0, -4.0, 0.75, -2.5),
+            (1.0, 3.0, -2.0, 0.6, 5.0 / 6.0),
+            (1.0, 0.3, 0.3, 0.0, 0.3),
+        ] {
+            let found = acting_part(band, from, to);
+            assert!((found.0 - part).abs() < 1e-12 && (found.1 - mean).abs() < 1e-12, "{band} {from} {to}: {found:?}");
+        }
     }
 }

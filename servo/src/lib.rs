@@ -35,7 +35,7 @@ mod wind_up;
 
 pub use arm::simulate_arm;
 pub use choice::Comparison;
-pub use choose::{Chosen, choose};
+pub use choose::{Chosen, From, choose};
 pub use diagnose::{Outcome, Paths, diagnose};
 pub use evaluate::evaluate;
 pub use evidence::Evidence;
@@ -48,5 +48,5 @@ pub use kinds::Kind;
 pub use law::{Law, Order, Param, Row};
 pub use model::{DriveModel, LoadRise, MODEL_SCHEMA, ServoModel, ServoModelError};
 pub use prepare::{Joint, Sizes, joints};
-pub use run::{Held, Run, Signal, Surroundings};
+pub use run::{Around, Held, Run, Signal, Surroundings};
 pub use simulate::{errors, simulate};

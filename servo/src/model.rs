@@ -30,6 +30,9 @@ pub struct DriveModel {
     pub gain: Option<f64>,
     /// N m s/rad, gone where the motor is off: derivative gain, back-EMF, and viscous friction where nothing parts them.
     pub damping: f64,
+    /// N m per rad/s of the set point; equal to a derivative gain that acts on the error.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub feedforward: f64,
     /// s.
     pub latency: f64,
     /// Greatest drive in the unit of what it follows; `None` without a limit.
@@ -44,6 +47,10 @@ pub struct DriveModel {
     /// Whether the encoder is on the link's side of a spring or of play; else it is on the motor's.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub link_side: bool,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// What the load coefficient is greater by at rest, and the speed at which that fades: μ + rise · e^{−(q̇/v)²}.
@@ -170,6 +177,7 @@ impl ServoModel {
                 feedback: law[Param::Feedback],
                 gain: joint.gain,
                 damping: torque(law, Param::Damping),
+                feedforward: torque(law, Param::Feedforward),
                 latency: law[Param::Latency],
                 limit: finite(law[Param::Limit]),
                 speed_limit: finite(law[Param::Speed]),
@@ -215,7 +223,7 @@ impl ServoModel {
             let limits = [drive.limit, drive.speed_limit, drive.gain];
             let sound = above(drive.torque_per_unit)
                 && above(drive.feedback)
-                && [drive.damping, drive.dead_band].into_iter().all(least)
+                && [drive.damping, drive.feedforward, drive.dead_band].into_iter().all(least)
                 && drive.latency.is_finite()
                 && limits.into_iter().flatten().all(above);
             if !sound {
@@ -269,6 +277,7 @@ impl ServoModel {
         law[Param::Scale] = 1.0 / s;
         law[Param::Feedback] = drive.feedback;
         law[Param::Damping] = drive.damping / s;
+        law[Param::Feedforward] = drive.feedforward / s;
         law[Param::Latency] = drive.latency;
         law[Param::Limit] = drive.limit.unwrap_or(f64::INFINITY);
         law[Param::Speed] = drive.speed_limit.unwrap_or(f64::INFINITY);

@@ -1,7 +1,7 @@
 //! What a fit does not miss is dropped; what could stand in the place of what stays is told.
 
 use crate::choice::{Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
-use crate::fit::{Fit, normal};
+use crate::fit::{Fit, cost, normal};
 use crate::interval::Spread;
 use crate::kinds::Kind;
 use crate::weigh::independent;
@@ -18,8 +18,10 @@ pub fn drop_needless(
         let mut worth = Vec::new();
         let mut sure = Vec::new();
         let missing = Missing::new(best);
+        let spread = Spread::of(best, choice.joint);
         for &kind in kinds.iter() {
-            if let Some(nats) = choice.surely(best, kinds, kind, samples, &missing) {
+            let off = choice.off_nothing(best, kind, samples, &spread);
+            if let Some(nats) = choice.surely(best, kinds, kind, samples, &missing).filter(|_| off > TAKEN) {
                 sure.push((kind, nats));
                 continue;
             }
@@ -29,11 +31,13 @@ pub fn drop_needless(
             let mut law = best.law;
             kind.clear(&mut law, &choice.joint.start, &without);
             let poor = choice.fit(&law, &without, None, TRIAL);
-            let nats = choice.nats(best, &poor, kind, samples);
+            // Its number must lie off nothing as well: a fit falls by what a loop that answers late does.
+            let nats = choice.nats(best, &poor, kind, samples).min(off);
             // The bodies of the URDF weigh something for certain: where their weight alone accounts for a constant torque,
             // and fixes the drive's scale, no bias takes its place.
-            let weightless =
-                kind == Kind::Bias && !Spread::of(best).scale_is_known() && Spread::of(&poor).scale_is_known();
+            let weightless = kind == Kind::Bias
+                && !Spread::of(best, choice.joint).scale_is_known()
+                && Spread::of(&poor, choice.joint).scale_is_known();
             let relevant = choice.relevant(best, &poor) && !weightless;
             worth.push((kind, nats, relevant, poor, without));
         }
@@ -77,8 +81,12 @@ fn needless_pair(
 ) -> Option<([Kind; 2], f64, Vec<Kind>, Fit)> {
     let is_based_on = |kind: Kind| kinds.iter().any(|other| other.base() == Some(kind));
     let usual: Vec<Kind> = kinds.iter().copied().filter(|kind| kind.cost() == 0.0 && !is_based_on(*kind)).collect();
+    let missing = Missing::new(best);
     for (i, &a) in usual.iter().enumerate() {
         for &b in &usual[i + 1..] {
+            if choice.surely_both(best, [a, b], samples, &missing) {
+                continue;
+            }
             let without: Vec<Kind> = kinds.iter().copied().filter(|other| ![a, b].contains(other)).collect();
             let mut law = best.law;
             [a, b].into_iter().for_each(|kind| kind.clear(&mut law, &choice.joint.start, &without));
@@ -109,32 +117,70 @@ impl Missing {
         Missing { inverse: information.try_inverse() }
     }
 
-    /// dᵀ C⁻¹ d with the covariance C of the parameters at `at` and their distance d from where they would be.
-    fn loss(&self, at: &[usize], distance: &[f64]) -> Option<f64> {
+    /// dᵀ C⁻¹ d with the covariance C of the parameters at `at` and their distance d from where they would be; and the change of
+    /// all parameters that takes them there at the least cost.
+    fn loss(&self, at: &[usize], distance: &[f64]) -> Option<(f64, nalgebra::DVector<f64>)> {
         let inverse = self.inverse.as_ref()?;
         let block = nalgebra::DMatrix::from_fn(at.len(), at.len(), |i, j| inverse[(at[i], at[j])]);
         let d = nalgebra::DVector::from_column_slice(distance);
-        let loss = d.dot(&block.lu().solve(&d)?);
-        (loss.is_finite() && loss > 0.0).then_some(loss)
+        let pull = block.lu().solve(&d)?;
+        let loss = d.dot(&pull);
+        let change = nalgebra::DVector::from_fn(inverse.nrows(), |i, _| {
+            -at.iter().zip(pull.iter()).map(|(&j, pull)| inverse[(i, j)] * pull).sum::<f64>()
+        });
+        (loss.is_finite() && loss > 0.0).then_some((loss, change))
     }
 }
 
 impl Choice<'_> {
-    /// Nats that a kind is worth where there can be no doubt of it; `None` where a fit without it must say.
-    fn surely(&self, best: &Fit, kinds: &[Kind], kind: Kind, samples: f64, missing: &Missing) -> Option<f64> {
-        if kind.is_threshold() || kind == Kind::Bias || kinds.iter().any(|other| other.base() == Some(kind)) {
-            return None;
+    /// Nats by which the number of a kind lies off nothing, by all that may move it; infinite where nothing is no number of it.
+    fn off_nothing(&self, best: &Fit, kind: Kind, samples: f64, spread: &Spread) -> f64 {
+        let Some(&(param, _, _)) = kind.parameters().first() else { return f64::INFINITY };
+        let distance = best.law[param] - self.joint.start[param];
+        if kind.is_threshold() || !distance.is_finite() {
+            return f64::INFINITY;
         }
+        let Some(deviation) = spread.deviation(param) else { return f64::INFINITY };
+        let more = kind.parameters().len() as f64;
+        0.5 * (distance / deviation.max(1e-300)).powi(2) - 0.5 * more * samples.ln() - kind.cost()
+    }
+
+    /// What a fit loses without some parameters where there can be no doubt of them: to second order, as far as the errors there
+    /// bear it out.
+    fn clear_loss(&self, best: &Fit, kinds: &[Kind], missing: &Missing) -> Option<(f64, f64)> {
         let (mut at, mut distance) = (Vec::new(), Vec::new());
-        for (param, _, _) in kind.parameters() {
+        for (param, _, _) in kinds.iter().flat_map(|kind| kind.parameters()) {
             at.push(best.free.iter().position(|free| free == param)?);
             distance.push(best.law[*param] - self.joint.start[*param]);
         }
-        let loss = missing.loss(&at, &distance)?;
-        let more = kind.parameters().len() as f64;
+        let (linear, change) = missing.loss(&at, &distance)?;
+        let mut there = best.law;
+        for (&param, change) in best.free.iter().zip(change.iter()) {
+            let [least, greatest] = self.joint.ranges.bounds[param as usize];
+            there[param] = (there[param] + change).clamp(least, greatest);
+        }
+        let loss = linear.min(cost(&there, &self.joint.runs) - best.cost);
+        Some((loss, at.len() as f64)).filter(|_| loss > 4.0 * self.least(best.cost))
+    }
+
+    /// Whether there can be no doubt of two kinds together.
+    fn surely_both(&self, best: &Fit, pair: [Kind; 2], samples: f64, missing: &Missing) -> bool {
+        self.clear_loss(best, &pair, missing).is_some_and(|(loss, numbers)| {
+            0.5 * samples * ((best.cost + loss) / best.cost.max(1e-300)).ln() - 0.5 * numbers * samples.ln() > SURE
+        })
+    }
+
+    /// Nats that a kind is worth where there can be no doubt of it; `None` where a fit without it must say.
+    fn surely(&self, best: &Fit, kinds: &[Kind], kind: Kind, samples: f64, missing: &Missing) -> Option<f64> {
+        // Beside a limit or a dead band no kind is felt evenly.
+        let is_even = kind.is_linear() && !kinds.iter().any(|other| other.is_threshold());
+        if !is_even || kind == Kind::Bias || kinds.iter().any(|other| other.base() == Some(kind)) {
+            return None;
+        }
+        let (loss, more) = self.clear_loss(best, &[kind], missing)?;
         let nats =
             0.5 * samples * ((best.cost + loss) / best.cost.max(1e-300)).ln() - 0.5 * more * samples.ln() - kind.cost();
-        (nats > SURE && loss > 4.0 * self.least(best.cost)).then_some(nats)
+        (nats > SURE).then_some(nats)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Runs of each joint out of logs, and what their parameters may be.
 
-use crate::around::{derivatives, surroundings};
+use crate::around::{derivatives, motion, surroundings};
 use crate::clock::repeats;
 use crate::fit::Ranges;
 use crate::given::Given;
@@ -121,8 +121,10 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 
 /// The joints of a model with their runs in logs.
 pub fn joints(model: &Model, episodes: &[Episode], given: &Given) -> Vec<Joint> {
-    let around: Vec<_> = episodes.par_iter().map(|episode| surroundings(model, episode)).collect();
     let stale: Vec<Vec<bool>> = episodes.iter().map(repeats).collect();
+    let nothing = vec![None; model.dof()];
+    let of = |(episode, stale): (&Episode, &Vec<bool>)| surroundings(model, &motion(episode, stale, &nothing));
+    let around: Vec<_> = episodes.par_iter().zip(&stale).map(of).collect();
     (0..model.dof()).into_par_iter().map(|j| joint(model, episodes, given, j, &around, &stale)).collect()
 }
 
@@ -170,6 +172,7 @@ fn joint(
         let start = episode.time[0];
         let time: Vec<f64> = episode.time.iter().map(|t| t - start).collect();
         runs.push(Run {
+            target_rate: target.map(|u| Held::new(&time, u).rate()),
             target: target.map(|u| Held::new(&time, u)),
             delivered: w.filter(|_| target.is_none()).map(|w| Held::new(&time, w)),
             restarts: restarts(&on, target.is_some(), episode.dt()),
@@ -192,8 +195,8 @@ fn joint(
     sizes.speed = rms(speeds.iter().copied()).max(1e-3);
     sizes.top = speeds.iter().fold(0.0_f64, |a, v| a.max(v.abs())).max(1e-2);
     sizes.acceleration = rms(accelerations.iter().copied()).max(1e-1);
-    sizes.gravity = rms(runs.iter().flat_map(|run| run.around.gravity.iter().copied()));
-    let inertias = runs.iter().flat_map(|run| run.around.inertia.iter().copied());
+    sizes.gravity = rms(runs.iter().flat_map(|run| run.around.rows.iter().map(|row| row.gravity)));
+    let inertias = runs.iter().flat_map(|run| run.around.rows.iter().map(|row| row.inertia));
     sizes.inertia = inertias.clone().sum::<f64>() / inertias.count().max(1) as f64;
     runs.iter_mut().for_each(|run| run.mass = sizes.inertia);
     let dt = episodes.first().map_or(0.02, Episode::dt);
@@ -232,6 +235,7 @@ fn ranges(sizes: &Sizes, dt: f64) -> Ranges {
     set(Param::Armature, 0.0, 1e3 * w / sizes.acceleration, w / sizes.acceleration);
     set(Param::Damping, 0.0, 1e3 * w / sizes.speed, w / sizes.speed);
     set(Param::Viscous, 0.0, 1e3 * w / sizes.speed, w / sizes.speed);
+    set(Param::Feedforward, 0.0, 1e3 * w / sizes.speed, w / sizes.speed);
     set(Param::Coulomb, 0.0, sizes.peak, w);
     set(Param::Rise, 0.0, sizes.peak, w);
     set(Param::StribeckVelocity, 0.01 * sizes.speed, sizes.top, 0.3 * sizes.speed);

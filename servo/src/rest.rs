@@ -44,21 +44,17 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::{Held, Run, Signal, Surroundings};
+    use crate::run::{Around, Held, Run, Signal, Surroundings};
 
     /// A joint that rests at zero by its law, and whose log shows these positions.
     fn joint(position: Vec<f64>) -> Joint {
         let count = position.len();
         let time: Vec<f64> = (0..count).map(|k| 0.01 * k as f64).collect();
         let zeros = vec![0.0; count];
-        let around = Surroundings {
-            inertia: vec![0.01; count],
-            gravity: zeros.clone(),
-            slope: zeros.clone(),
-            coupling: zeros.clone(),
-        };
+        let around = Surroundings::new(1, vec![Around { inertia: 0.01, ..Around::default() }; count]);
         let run = Run {
             target: Some(Held::new(&time, &zeros)),
+            target_rate: None,
             delivered: None,
             restarts: vec![],
             position,

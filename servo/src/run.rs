@@ -61,7 +61,19 @@ impl Held {
         self.values[k]
     }
 
+    /// Its rate at each sample, by the samples on both sides: a jump is spread over a sample before and one after it, so that
+    /// it acts when it should in the mean.
+    pub fn rate(&self) -> Held {
+        let last = self.values.len() - 1;
+        let of = |k: usize| {
+            let (from, to) = (k.saturating_sub(1), (k + 1).min(last));
+            (self.values[to] - self.values[from]) / (self.time[to] - self.time[from]).max(1e-9)
+        };
+        Held::new(&self.time, &(0..=last).map(of).collect::<Vec<_>>())
+    }
+
     /// ∫ from the first sample to t; `hint` is a sample near t, moved to the last one before it.
+    #[inline(always)]
     fn until(&self, t: f64, hint: &mut usize) -> f64 {
         let last = self.values.len() - 1;
         while *hint > 0 && self.time[*hint] > t {
@@ -75,24 +87,88 @@ impl Held {
     }
 
     /// Mean from `t` to `t + h`.
+    #[inline(always)]
     pub fn mean(&self, t: f64, h: f64, hint: &mut usize) -> f64 {
         let start = self.until(t, hint);
         (self.until(t + h, hint) - start) / h
     }
 }
 
-/// What the rest of the arm does to one joint along a log, a row for each sample. With the joint elsewhere than measured by d,
-/// gravity is `gravity` cos d + `slope` sin d: exact for a joint that turns, as is an inertia that does not change with d.
+/// What the rest of the arm does to one joint at an instant. With the joint elsewhere than at `position` by d, gravity is
+/// `gravity` cos d + `slope` sin d: exact for a joint that turns, as is an inertia that does not change with d.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Around {
+    /// Position of the joint, rad.
+    pub position: f64,
+    /// M_jj, kg m².
+    pub inertia: f64,
+    /// Gravity torque there, N m.
+    pub gravity: f64,
+    /// Its derivative by the joint's own position, N m/rad.
+    pub slope: f64,
+    /// Torque by the motion of other joints, N m.
+    pub coupling: f64,
+}
+
+impl Around {
+    /// Part of the way to another.
+    #[inline]
+    pub fn towards(&self, next: &Around, part: f64) -> Around {
+        let between = |a: f64, b: f64| a + part * (b - a);
+        Around {
+            position: between(self.position, next.position),
+            inertia: between(self.inertia, next.inertia),
+            gravity: between(self.gravity, next.gravity),
+            slope: between(self.slope, next.slope),
+            coupling: between(self.coupling, next.coupling),
+        }
+    }
+}
+
+/// What the rest of the arm does to one joint along a log: some rows in each interval between samples.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Surroundings {
-    /// M_jj, kg m².
-    pub inertia: Vec<f64>,
-    /// Gravity torque at the measured position, N m.
-    pub gravity: Vec<f64>,
-    /// Its derivative by the joint's own position, N m/rad.
-    pub slope: Vec<f64>,
-    /// Torque by the motion of other joints, N m.
-    pub coupling: Vec<f64>,
+    /// Rows in an interval.
+    pub per: usize,
+    /// The rows.
+    pub rows: Vec<Around>,
+    /// Integral of the coupling up to each row, N m times the time between rows.
+    impulse: Vec<f64>,
+}
+
+impl Surroundings {
+    /// Of so many rows in an interval.
+    pub fn new(per: usize, rows: Vec<Around>) -> Surroundings {
+        let mut impulse = vec![0.0; rows.len()];
+        for row in 1..rows.len() {
+            impulse[row] = impulse[row - 1] + 0.5 * (rows[row - 1].coupling + rows[row].coupling);
+        }
+        Surroundings { per, rows, impulse }
+    }
+
+    /// At a sample.
+    #[inline]
+    pub fn at(&self, sample: usize) -> Around {
+        self.rows[sample * self.per]
+    }
+
+    /// In the middle of a step behind a sample, which lies `from` one part `to` another of the way to the next. Other joints jolt
+    /// this one within less than a step: their torque is its mean over the step, and no impulse is lost.
+    #[inline(always)]
+    pub fn over(&self, sample: usize, [from, to]: [f64; 2]) -> Around {
+        let (start, per) = (sample * self.per, self.per as f64);
+        let along = 0.5 * (from + to) * per;
+        let row = start + along as usize;
+        let middle = self.rows[row].towards(&self.rows[row + 1], along.fract());
+        let until = |part: f64| {
+            let along = part * per;
+            let row = (start + along as usize).min(self.rows.len() - 2);
+            let rest = start as f64 + along - row as f64;
+            let [a, b] = [row, row + 1].map(|row| self.rows[row].coupling);
+            self.impulse[row] + rest * (a + 0.5 * rest * (b - a))
+        };
+        Around { coupling: (until(to) - until(from)) / ((to - from) * per), ..middle }
+    }
 }
 
 /// One joint's part of one log.
@@ -104,6 +180,8 @@ pub struct Run {
     pub position: Vec<f64>,
     /// Set point.
     pub target: Option<Held>,
+    /// Its rate, rad/s.
+    pub target_rate: Option<Held>,
     /// Logged w, where nothing else tells what the drive does.
     pub delivered: Option<Held>,
     /// Whether the motor is on, from each sample to the next.
@@ -148,5 +226,25 @@ impl Run {
             Some(row) => row.iter().map(|&x| x != 0.0).collect(),
             None => vec![true; episode.len()],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jolt_between_the_middles_of_steps_is_felt_in_full() {
+        // Four rows in each of two intervals; a jolt of 1 N m at one row has an impulse of 1 N m times the time between rows.
+        let row = |k: usize| Around { coupling: f64::from(u8::from(k == 3)), gravity: k as f64, ..Around::default() };
+        let around = Surroundings::new(4, (0..9).map(row).collect());
+        for steps in [1, 2, 3, 5, 8] {
+            let part = 1.0 / f64::from(steps);
+            let spans = (0..2).flat_map(|k| (0..steps).map(move |i| (k, [i, i + 1].map(|i| f64::from(i) * part))));
+            let impulse: f64 = spans.map(|(k, span)| around.over(k, span).coupling * 4.0 * part).sum();
+            assert!((impulse - 1.0).abs() < 1e-12, "{steps}: {impulse}");
+        }
+        let middle = around.over(1, [0.25, 0.75]);
+        assert!((middle.gravity - 6.0).abs() < 1e-12);
     }
 }

@@ -1,26 +1,102 @@
 //! One joint, simulated freely under what it was told, the others moving as they were measured.
 
+use crate::around::Trace;
 use crate::law::{Law, Order, Param};
-use crate::run::{Held, Run};
+use crate::run::{Around, Held, Run};
 use crate::wind_up::{Shaft, Wound};
 
 /// Step of the integrator, s: this part of the servo's own time constant, within these bounds.
-pub const STEP_PART: f64 = 0.08;
+pub const STEP_PART: f64 = 0.1;
 /// Least and greatest step, s.
 pub const STEPS: [f64; 2] = [1e-3, 1e-2];
 
+/// Position and speed of the link at an instant, rad and rad/s.
+pub type State = (f64, f64);
+
 /// Positions at the samples of a run, rad, into `out`, from the first measured one at rest.
 pub fn simulate(law: &Law, run: &Run, out: &mut Vec<f64>) {
+    follow(law, run, out, |_, _, _| {});
+}
+
+/// How a law moves its joint along a run.
+pub fn trace(law: &Law, run: &Run) -> Trace {
+    let mut tracer = Tracer::new(law, run);
+    let mut shown = Vec::new();
+    follow(law, run, &mut shown, |span, before, after| tracer.see(span, before, after));
+    tracer.finish(run, shown)
+}
+
+/// A trace under way: it is told of the steps of a simulation, and keeps the state at rows and halfway between them.
+pub struct Tracer {
+    trace: Trace,
+    per: usize,
+    last: State,
+}
+
+impl Tracer {
+    /// Of a joint with a law, along a run.
+    pub fn new(law: &Law, run: &Run) -> Tracer {
+        let trace = Trace { offset: law[Param::Offset], ..Trace::default() };
+        Tracer { trace, per: run.around.per, last: (run.position[0], 0.0) }
+    }
+
+    /// A step: where it lies, in samples, and the link's state before and after it.
+    #[inline]
+    pub fn see(&mut self, [from, to]: [f64; 2], before: State, after: State) {
+        let halves = (2 * self.per) as f64;
+        loop {
+            let at = self.trace.speed.len() as f64 / halves;
+            if at >= to {
+                break;
+            }
+            let part = ((at - from) / (to - from)).clamp(0.0, 1.0);
+            if self.trace.speed.len().is_multiple_of(2) {
+                self.trace.position.push(before.0 + part * (after.0 - before.0));
+            }
+            self.trace.speed.push(before.1 + part * (after.1 - before.1));
+        }
+        self.last = after;
+    }
+
+    /// The trace, with what the encoder showed at samples.
+    pub fn finish(mut self, run: &Run, shown: Vec<f64>) -> Trace {
+        let rows = (run.time.len() - 1) * self.per + 1;
+        self.trace.position.resize(rows, self.last.0);
+        self.trace.speed.resize(2 * rows - 1, self.last.1);
+        self.trace.shown = shown;
+        self.trace
+    }
+}
+
+/// Sine and cosine of a small angle, to 1e-9 within .2 rad.
+#[inline]
+fn turn(angle: f64) -> (f64, f64) {
+    if angle.abs() > 0.2 {
+        return angle.sin_cos();
+    }
+    let square = angle * angle;
+    let sin = angle * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0)));
+    (sin, 1.0 - 0.5 * square * (1.0 - square / 12.0 * (1.0 - square / 30.0)))
+}
+
+/// The weight on a link that the law turned to `angle`, N m, with what the others' motion adds.
+#[inline]
+fn weight(around: &Around, angle: f64) -> f64 {
+    let (sin, cos) = turn(angle - around.position);
+    around.gravity * cos + around.slope * sin + around.coupling
+}
+
+/// Simulates; `see` is told of each step where it lies, in samples, and the link's state before and after it.
+#[inline]
+fn follow(law: &Law, run: &Run, out: &mut Vec<f64>, mut see: impl FnMut([f64; 2], State, State)) {
     out.clear();
     let count = run.time.len();
     if let Some(shaft) = law.shaft(run.mass) {
-        return simulate_wound(law, &shaft, run, out);
+        return follow_wound(law, &shaft, run, out, see);
     }
-    let (mut q, mut v, mut load) = (run.position[0], 0.0, 0.0);
+    let (mut q, mut v) = (run.position[0], 0.0);
     let (mut hint, mut restart) = (0, 0);
     let sigma = law[Param::Scale];
-    let gain = law[Param::Feedback] * run.gain;
-    let latency = law[Param::Latency];
     out.push(q);
     for k in 0..count - 1 {
         if run.restarts.get(restart) == Some(&k) {
@@ -29,72 +105,55 @@ pub fn simulate(law: &Law, run: &Run, out: &mut Vec<f64>) {
         }
         let dt = run.time[k + 1] - run.time[k];
         let parts = (dt / run.step - 1e-6).ceil().max(1.0);
-        let h = dt / parts;
-        let around = &run.around;
-        let apart = q - run.position[k] - law[Param::Offset];
-        let (sin, cos) = apart.sin_cos();
-        // Gravity where the joint is, and its slope, for all of the step.
-        let gravity = around.gravity[k] * cos + around.slope[k] * sin;
-        let slope = around.slope[k] * cos - around.gravity[k] * sin;
-        let q_start = q;
-        // What the others' motion adds to gravity within the step: the same angle, the surroundings of the next sample.
-        let next = {
-            let apart = q - run.position[k + 1] - law[Param::Offset];
-            let (sin, cos) = apart.sin_cos();
-            around.gravity[k + 1] * cos + around.slope[k + 1] * sin
-        };
+        let (h, of_sample) = (dt / parts, 1.0 / parts);
         for part in 0..parts as usize {
-            let t = run.time[k] + part as f64 * h;
-            let along = (part as f64 + 0.5) / parts;
-            let inertia = sigma * (around.inertia[k] + along * (around.inertia[k + 1] - around.inertia[k])) / h;
-            let coupling = around.coupling[k] + along * (around.coupling[k + 1] - around.coupling[k]);
-            let weight = gravity + along * (next - gravity) + slope * (q + 0.5 * h * v - q_start);
-            let order = order(run, k, t, h, latency, gain, &mut hint);
-            let row = law.row(h, q, v, order, load);
-            let push = row.push + inertia * v - sigma * (weight + coupling);
-            let end = law.settle(row.factor + inertia, push, row.bound, row.delivered);
-            load = row.torque;
-            q = Law::move_on(h, q, v, end);
-            v = end;
+            let span = [part, part + 1].map(|part| part as f64 * of_sample);
+            let around = run.around.over(k, span);
+            let inertia = sigma * around.inertia / h;
+            let weight = weight(&around, q + 0.5 * h * v - law[Param::Offset]);
+            let order = order(law, run, k, run.time[k] + part as f64 * h, h, &mut hint);
+            let row = law.row(h, q, v, order, inertia);
+            let push = row.push + inertia * v - sigma * weight;
+            let end = law.settle(&row, v, row.factor + inertia, push);
+            let before = (q, v);
+            (q, v) = (Law::move_on(h, row.end, q, v, end), end);
+            see(span.map(|part| k as f64 + part), before, (q, v));
         }
         out.push(q);
     }
 }
 
 /// The same of a joint whose motor and link turn apart: the side that the encoder is on.
-fn simulate_wound(law: &Law, shaft: &Shaft, run: &Run, out: &mut Vec<f64>) {
-    let around = &run.around;
+fn follow_wound(law: &Law, shaft: &Shaft, run: &Run, out: &mut Vec<f64>, mut see: impl FnMut([f64; 2], State, State)) {
     let sigma = law[Param::Scale];
-    let (gain, latency) = (law[Param::Feedback] * run.gain, law[Param::Latency]);
     let shown = |state: &Wound| if law.link_side { state.link[0] } else { state.motor[0] };
-    let mut state = shaft.at_rest(run.position[0], sigma * around.gravity[0], law.link_side);
-    let (mut hint, mut restart, mut load) = (0, 0, 0.0);
+    let mut state = shaft.at_rest(run.position[0], sigma * run.around.at(0).gravity, law.link_side);
+    let (mut hint, mut restart) = (0, 0);
     out.push(shown(&state));
     for k in 0..run.time.len() - 1 {
         if run.restarts.get(restart) == Some(&k) {
             restart += 1;
             let (q, v) = run.state(k);
-            state = shaft.at_rest(q, sigma * around.gravity[k], law.link_side);
+            state = shaft.at_rest(q, sigma * run.around.at(k).gravity, law.link_side);
             (state.motor[1], state.link[1]) = (v, v);
         }
         let dt = run.time[k + 1] - run.time[k];
         let parts = (dt / run.step - 1e-6).ceil().max(1.0);
-        let h = dt / parts;
+        let (h, of_sample) = (dt / parts, 1.0 / parts);
         for part in 0..parts as usize {
-            let along = (part as f64 + 0.5) / parts;
-            let between = |row: &[f64]| row[k] + along * (row[k + 1] - row[k]);
-            let middle = state.link[0] + 0.5 * h * state.link[1] - law[Param::Offset];
-            let (sin, cos) = (middle - between(&run.position)).sin_cos();
-            let weight = between(&around.gravity) * cos + between(&around.slope) * sin + between(&around.coupling);
-            let inertia = sigma * between(&around.inertia) / h;
-            let order = order(run, k, run.time[k] + part as f64 * h, h, latency, gain, &mut hint);
+            let span = [part, part + 1].map(|part| part as f64 * of_sample);
+            let around = run.around.over(k, span);
+            let weight = weight(&around, state.link[0] + 0.5 * h * state.link[1] - law[Param::Offset]);
+            let inertia = sigma * around.inertia / h;
+            let order = order(law, run, k, run.time[k] + part as f64 * h, h, &mut hint);
             // The servo closes its loop over what its encoder shows; the rotor has its own speed.
-            let row = law.row(h, shown(&state), state.motor[1], order, load);
+            let row = law.row(h, shown(&state), state.motor[1], order, 0.0);
             let push = inertia * state.link[1] - sigma * weight;
-            shaft.step(h, &mut state, &row, inertia, push, |factor, push| {
-                law.settle(factor, push, row.bound, row.delivered)
-            });
-            load = row.torque;
+            let before = (state.link[0], state.link[1]);
+            let speed = state.motor[1];
+            shaft.step(h, &mut state, &row, inertia, push, |factor, push| law.settle(&row, speed, factor, push));
+            let after = (state.link[0], state.link[1]);
+            see(span.map(|part| k as f64 + part), before, after);
         }
         out.push(shown(&state));
     }
@@ -102,13 +161,19 @@ fn simulate_wound(law: &Law, shaft: &Shaft, run: &Run, out: &mut Vec<f64>) {
 
 /// What the drive is told from `t` to `t + h`, in the step behind sample `k`.
 #[inline]
-fn order(run: &Run, k: usize, t: f64, h: f64, latency: f64, gain: f64, hint: &mut usize) -> Order {
+pub(crate) fn order(law: &Law, run: &Run, k: usize, t: f64, h: f64, hint: &mut usize) -> Order {
     if !run.on[k] {
         return Order::Off;
     }
-    let mean = |held: &Held, hint: &mut usize| held.mean(t - latency, h, hint);
+    let mean = |held: &Held, hint: &mut usize| held.mean(t - law[Param::Latency], h, hint);
     match (&run.target, &run.delivered) {
-        (Some(target), _) => Order::Follow(mean(target, hint), gain),
+        (Some(target), _) => {
+            let more = match &run.target_rate {
+                Some(rate) if law[Param::Feedforward] != 0.0 => law[Param::Feedforward] * mean(rate, hint),
+                _ => 0.0,
+            };
+            Order::Follow(mean(target, hint), law[Param::Feedback] * run.gain, more)
+        }
         (None, Some(delivered)) => Order::Deliver(mean(delivered, hint)),
         (None, None) => Order::Off,
     }

@@ -66,13 +66,13 @@ pub fn weigh(joint: &mut Joint, law: &Law) {
     let step = joint.encoder_step();
     let mut path = Vec::new();
     let [least, greatest] = STEPS;
-    // A spring is followed as closely as a servo; the hard end of play, as closely as the shortest step lets it.
-    let spring = 1.0 / law[Param::Spring];
+    // A spring is followed more closely than a servo, which damps what a step does wrong; and so is the hard end of play.
+    let spring = 1.1 / law[Param::Spring];
     let inertia = joint.sizes.inertia;
     let shortest = law
         .time_constant(inertia)
-        .min(if law.winds_up() { 2.0 * spring } else { f64::INFINITY })
-        .min(if law[Param::DeadBand] > 0.0 { law.coasting(inertia) } else { f64::INFINITY });
+        .min(if law.winds_up() { spring } else { f64::INFINITY })
+        .min(if law[Param::DeadBand] > 0.0 { 0.5 * law.coasting(inertia) } else { f64::INFINITY });
     let length = (STEP_PART * shortest).clamp(least, greatest);
     for run in &mut joint.runs {
         run.step = length;

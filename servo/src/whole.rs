@@ -4,17 +4,16 @@
 //! them is the effect's few numbers θ. Gauss–Newton on θ, with what each joint's own parameters can do taken out of both
 //! sides: N = Σ w T̃ᵀT̃, g = Σ w T̃ᵀe, weights w of each joint by its own error.
 
-use crate::around::surroundings;
+use crate::around::{Motion, surroundings};
 use crate::choice::{Projector, TAKEN};
 use crate::choose::Chosen;
 use crate::fit::{Fit, fit};
 use crate::kinds::Kind;
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
-use crate::run::Surroundings;
+use crate::run::{Around as Row, Surroundings};
 use crate::simulate::errors;
 use crate::weigh::{independent, least, tracking};
-use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Effect, GravityMisalignment, Payload, Plant};
 use nalgebra::{DMatrix, DVector};
@@ -133,15 +132,16 @@ pub fn changed(model: &Model, effects: &[Effect]) -> Option<Model> {
     Plant::new(model, effects, 1e-3).ok().map(|plant| plant.model().clone())
 }
 
+/// Surroundings of all joints along all logs, `[log][joint]`.
 type Around = Vec<Vec<Surroundings>>;
 
-fn around(model: &Model, episodes: &[Episode]) -> Around {
-    episodes.par_iter().map(|episode| surroundings(model, episode)).collect()
+fn around(model: &Model, motions: &[Motion]) -> Around {
+    motions.par_iter().map(|motion| surroundings(model, motion)).collect()
 }
 
-/// Puts joints into the surroundings of a model.
-pub fn surround(joints: &mut [Joint], model: &Model, episodes: &[Episode]) {
-    put(joints, &around(model, episodes));
+/// Puts joints into the surroundings of a model that moves so.
+pub fn surround(joints: &mut [Joint], model: &Model, motions: &[Motion]) {
+    put(joints, &around(model, motions));
 }
 
 /// Puts joints into other surroundings.
@@ -162,7 +162,7 @@ struct Account {
 struct Search<'a> {
     whole: Whole,
     model: &'a Model,
-    episodes: &'a [Episode],
+    motions: &'a [Motion],
     plain: &'a Around,
     /// Surroundings with each number moved by its probe.
     probed: &'a [Around],
@@ -254,7 +254,7 @@ impl Search<'_> {
             let step = self.step(&normal, &gradient)?;
             values = self.whole.clamped(self.model, &(DVector::from_column_slice(&values) + step));
             let model = changed(self.model, &[self.whole.effect(self.model, &values)?])?;
-            base = around(&model, self.episodes);
+            base = around(&model, self.motions);
             put(joints, &base);
             for (account, fit) in accounts.iter_mut().zip(&fits) {
                 if let (Some(account), Some(fit)) = (account, fit) {
@@ -282,12 +282,15 @@ fn fit_all(joints: &[Joint], accounts: &[Option<Account>], steps: usize) -> Vec<
 
 /// Surroundings of `base` with the change from `plain` to `probed` on top.
 fn shifted(base: &Around, plain: &Around, probed: &Around) -> Around {
-    let row = |a: &[f64], b: &[f64], c: &[f64]| a.iter().zip(b).zip(c).map(|((a, b), c)| a + c - b).collect();
-    let one = |((a, b), c): ((&Surroundings, &Surroundings), &Surroundings)| Surroundings {
-        inertia: row(&a.inertia, &b.inertia, &c.inertia),
-        gravity: row(&a.gravity, &b.gravity, &c.gravity),
-        slope: row(&a.slope, &b.slope, &c.slope),
-        coupling: row(&a.coupling, &b.coupling, &c.coupling),
+    let row = |((a, b), c): ((&Row, &Row), &Row)| Row {
+        position: a.position,
+        inertia: a.inertia + c.inertia - b.inertia,
+        gravity: a.gravity + c.gravity - b.gravity,
+        slope: a.slope + c.slope - b.slope,
+        coupling: a.coupling + c.coupling - b.coupling,
+    };
+    let one = |((a, b), c): ((&Surroundings, &Surroundings), &Surroundings)| {
+        Surroundings::new(a.per, a.rows.iter().zip(&b.rows).zip(&c.rows).map(row).collect())
     };
     let log = |((a, b), c): ((&Vec<_>, &Vec<_>), &Vec<_>)| a.iter().zip(b).zip(c).map(one).collect();
     base.iter().zip(plain).zip(probed).map(log).collect()
@@ -313,12 +316,12 @@ pub struct Outcome {
 /// the surroundings of the model that it is given.
 pub fn look(
     model: &Model,
-    episodes: &[Episode],
+    motions: &[Motion],
     joints: &mut [Joint],
     chosen: &[Option<Chosen>],
     without: &[Whole],
 ) -> Outcome {
-    let plain = around(model, episodes);
+    let plain = around(model, motions);
     let beside: Vec<Option<Account>> =
         chosen.iter().map(|c| c.as_ref().map(|c| Account { law: c.fit.law, free: c.fit.free.clone() })).collect();
     let constant = |kind: &(Kind, f64)| matches!(kind.0, Kind::Bias | Kind::Offset);
@@ -349,18 +352,18 @@ pub fn look(
                 if base > 0.0 {
                     values[0] = base;
                 }
-                let there = around(&changed(model, &[whole.effect(model, &values)?])?, episodes);
+                let there = around(&changed(model, &[whole.effect(model, &values)?])?, motions);
                 if base == 0.0 {
                     return Some(there);
                 }
                 let mut alone = vec![0.0; probes.len()];
                 alone[0] = base;
-                let alone = around(&changed(model, &[whole.effect(model, &alone)?])?, episodes);
+                let alone = around(&changed(model, &[whole.effect(model, &alone)?])?, motions);
                 Some(shifted(&plain, &alone, &there))
             })
             .collect();
         let Some(probed) = probed else { continue };
-        let search = Search { whole, model, episodes, plain: &plain, probed: &probed, probes: &probes };
+        let search = Search { whole, model, motions, plain: &plain, probed: &probed, probes: &probes };
         put(joints, &plain);
         let price = |fits: &[Option<Fit>]| {
             let samples: f64 = joints

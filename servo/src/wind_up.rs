@@ -90,8 +90,8 @@ impl Shaft {
         let factor = row.factor + both - both * both / link;
         let end = settle(factor, row.push - through + both * (push + through) / link);
         let link_end = (push + through + both * end) / link;
-        state.motor = [Law::move_on(h, theta, omega, end), end];
-        state.link = [Law::move_on(h, q, v, link_end), link_end];
+        state.motor = [Law::move_on(h, row.end, theta, omega, end), end];
+        state.link = [Law::move_on(h, END, q, v, link_end), link_end];
     }
 }
 
@@ -118,9 +118,8 @@ mod tests {
                 let row = law.row(h, state.motor[0], state.motor[1], Order::Off, 0.0);
                 let inertia = law[Param::Scale] * mass / h;
                 let push = inertia * state.link[1];
-                shaft.step(h, &mut state, &row, inertia, push, |factor, push| {
-                    law.settle(factor, push, row.bound, row.delivered)
-                });
+                let speed = state.motor[1];
+                shaft.step(h, &mut state, &row, inertia, push, |factor, push| law.settle(&row, speed, factor, push));
                 state
             })
             .collect()

@@ -110,6 +110,25 @@ fn dry_friction_and_a_rotor_are_found_with_their_sizes() {
     assert_eq!(ServoModel::from_json(&text, &model).unwrap(), outcome.corrected);
 }
 
+/// A turntable that carries nothing, its derivative gain on the error: in a law that brakes by its own speed alone, this friction
+/// was taken for friction under load.
+#[test]
+fn dry_friction_under_a_derivative_gain_on_the_error_is_plain_dry_friction() {
+    let model = model();
+    let (kinds, outcome) = kinds(
+        &model,
+        &logs(&model, [6.0, 3.0], |law| {
+            law[Param::Feedforward] = 0.06;
+            law[Param::Coulomb] = 0.02;
+        }),
+    );
+    assert_eq!(kinds, ["coulomb_friction"]);
+    let found = outcome.diagnosis.drive["b"].constants["feedforward"].value;
+    assert!((found / (0.06 * 3.0) - 1.0).abs() < 0.1, "{found}");
+    let text = serde_json::to_string(&outcome.corrected).unwrap();
+    assert_eq!(ServoModel::from_json(&text, &model).unwrap(), outcome.corrected);
+}
+
 #[test]
 fn a_gain_that_is_not_the_given_one_is_claimed_and_the_given_one_is_not() {
     let model = model();

@@ -14,7 +14,7 @@ use crate::draw::{Drawn, Sort};
 use crate::truth::{ServoTruth, Truth, is_unknown};
 use arm::{Arm, Drive};
 pub(crate) use draw::{AGAINST, CLASH, FREE};
-use draw::{servo_effect, servo_toml};
+use draw::{PART, servo_effect, servo_toml};
 use gapscope_effects::Kind;
 use motion::{Clock, FAMILIES, Motion};
 use nalgebra::{DMatrix, DVector};
@@ -250,7 +250,9 @@ fn limit(
         if !speed && kind != Kind::TorqueSaturation.name() {
             continue;
         }
-        let part = drawn[which].sealed.parameters.get("part").and_then(serde_json::Value::as_f64).unwrap_or(0.5);
+        // What is drawn of a limit is no number of the truth; what it comes to is.
+        let drawn_part = drawn[which].sealed.parameters.remove(PART);
+        let part = drawn_part.as_ref().and_then(serde_json::Value::as_f64).unwrap_or(0.5);
         let joint = *(0..real.len()).collect::<Vec<_>>().choose(random).unwrap_or(&0);
         let mut sizes: Vec<f64> = Vec::new();
         for told in &told[..episodes] {

@@ -25,6 +25,9 @@ const FRICTION: f64 = 0.02;
 /// Payload of size 1, as a part of the arm's mass, and force of size 1, as a part of its weight.
 const PAYLOAD: f64 = 0.15;
 const FORCE: f64 = 0.3;
+/// Part of its time constant in which the fastest damping of an arm is stepped, and least and greatest step of the physics, s.
+const RESOLVED: f64 = 0.15;
+const STEPS: [f64; 2] = [1e-4, 5e-4];
 /// Postures at which weight and inertia are looked at.
 const POSTURES: usize = 24;
 /// How far joints turn from the middle, rad.
@@ -53,6 +56,8 @@ pub(crate) struct Arm {
     pub(crate) robot: Robot,
     pub(crate) drives: Vec<Drive>,
     pub(crate) weight: Vec<f64>,
+    /// Step of the physics that its fastest damping asks for, s.
+    pub(crate) step: f64,
 }
 
 /// Draws an arm.
@@ -60,13 +65,17 @@ pub(crate) fn arm(random: &mut Pcg64) -> Result<Arm, UrdfError> {
     let n = random.random_range(1..=JOINTS);
     let urdf = urdf(n, random);
     let model = Model::from_urdf(&urdf)?.model;
-    let (mut weight, mut inertia) = (vec![0.0_f64; n], vec![0.0; n]);
+    let (mut weight, mut inertia, mut lightest) = (vec![0.0_f64; n], vec![0.0; n], vec![f64::INFINITY; n]);
     let (mut data, mut mass, mut gravity) = (Data::new(&model), DMatrix::zeros(n, n), vec![0.0; n]);
     for _ in 0..POSTURES {
         let q: Vec<f64> = (0..n).map(|_| random.random_range(-REACH..REACH)).collect();
         model.gravity_torque(&mut data, &q, &mut gravity);
         model.mass_matrix(&mut data, &q, &mut mass);
+        let free = mass.clone().try_inverse();
         for j in 0..n {
+            // What a joint feels of the arm where all others give way.
+            let alone = free.as_ref().map_or(mass[(j, j)], |free| 1.0 / free[(j, j)]);
+            lightest[j] = lightest[j].min(alone);
             weight[j] = weight[j].max(gravity[j].abs());
             inertia[j] += mass[(j, j)] / POSTURES as f64;
         }
@@ -92,7 +101,9 @@ pub(crate) fn arm(random: &mut Pcg64) -> Result<Arm, UrdfError> {
         force: FORCE * total * model.gravity().length(),
         model,
     };
-    Ok(Arm { robot, drives, weight })
+    let fastest = drives.iter().zip(&lightest).map(|(drive, inertia)| drive.damping / inertia).fold(0.0, f64::max);
+    let step = (RESOLVED / fastest).clamp(STEPS[0], STEPS[1]);
+    Ok(Arm { robot, drives, weight, step })
 }
 
 fn urdf(n: usize, random: &mut Pcg64) -> String {

@@ -38,6 +38,9 @@ pub(crate) const FREE: [Kind; 12] = [
 pub(crate) const AGAINST: [Kind; 5] =
     [Kind::ServoGainError, Kind::ServoDampingError, Kind::SpeedLimit, Kind::DeadBand, Kind::ViscousFriction];
 
+/// A limit as a part of the greatest that a run without it takes: a number of the draw, gone from what is sealed.
+pub(crate) const PART: &str = "limit_part";
+
 /// Kinds of which at most one is drawn for a case: one hides in the other.
 pub(crate) const CLASH: [&[Kind]; 5] = [
     &[Kind::CoulombFriction, Kind::StribeckFriction],
@@ -112,7 +115,7 @@ pub(crate) fn servo_effect(
         // Its limits hang on how fast and how hard the arm moves: a first run has to show it.
         Sort::Known(Kind::SpeedLimit | Kind::TorqueSaturation) => {
             let part = random.random_range(0.2..0.6);
-            drawn(arm, sort, vec![joint], json!({ "part": part }), vec![])
+            drawn(arm, sort, vec![joint], json!({ PART: part }), vec![])
         }
         Sort::Known(Kind::JointElasticity) => {
             // The encoder of a servo is at its output; what bends lies behind it.

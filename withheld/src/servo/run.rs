@@ -9,8 +9,6 @@ use gapscope_effects::{DeadBand, Effect, EffectError, Plant, SpeedLimit};
 use rand_pcg::Pcg64;
 use std::f64::consts::TAU;
 
-/// Physics step, s.
-const STEP: f64 = 5e-4;
 /// A step of a 12-bit encoder, rad.
 pub(crate) const TICK: f64 = TAU / 4096.0;
 /// Time that an arm is held at its first set point before a log begins, s.
@@ -54,14 +52,14 @@ pub(crate) fn run(
     clock: &Clock,
 ) -> Result<Ran, EffectError> {
     let effects: Vec<Effect> = drawn.iter().flat_map(|drawn| drawn.in_episode(0)).cloned().collect();
-    let mut plant = Plant::new(&arm.robot.model, &effects, STEP)?;
+    let mut plant = Plant::new(&arm.robot.model, &effects, arm.step)?;
     if drawn.iter().any(|drawn| drawn.motor_encoder) {
         plant = plant.with_motor_encoders();
     }
     // A case has one law outside the catalogue at most.
     Ok(match drawn.iter().find_map(|drawn| drawn.outside.as_ref()) {
-        Some(law) => follow(&mut Disturbed::new(plant, law, &arm.robot.model), drives, told, clock),
-        None => follow(&mut plant, drives, told, clock),
+        Some(law) => follow(&mut Disturbed::new(plant, law, &arm.robot.model), drives, told, clock, arm.step),
+        None => follow(&mut plant, drives, told, clock, arm.step),
     })
 }
 
@@ -73,19 +71,19 @@ fn push(drive: &Drive, error: f64) -> f64 {
     (drive.stiffness * error).clamp(-drive.torque_limit, drive.torque_limit)
 }
 
-fn follow(plant: &mut impl Robot, drives: &[Drive], told: &Told, clock: &Clock) -> Ran {
+fn follow(plant: &mut impl Robot, drives: &[Drive], told: &Told, clock: &Clock, h: f64) -> Ran {
     let n = drives.len();
     let mut x = vec![0.0; plant.state_len()];
     let first: Vec<f64> = (0..n).map(|j| told.motions[j].at(told.times[0])).collect();
     plant.start(&first, &vec![0.0; n], &mut x);
-    let [mut tau, mut pushes, mut motor, mut motor_before] = std::array::from_fn(|_| vec![0.0; n]);
+    let [mut tau, mut pushes, mut motor, mut motor_before, mut speed_before] = std::array::from_fn(|_| vec![0.0; n]);
     plant.drive_positions(&x, &mut motor);
     let (mut before, mut free) = (x.clone(), x.clone());
     let mut ran = Ran { position: vec![vec![]; n], torque: vec![vec![]; n] };
-    let settling = (SETTLING / STEP).round() as usize;
+    let settling = (SETTLING / h).round() as usize;
     let mut next = 0;
     for step in 0.. {
-        let t = step as f64 * STEP - SETTLING;
+        let t = step as f64 * h - SETTLING;
         before.copy_from_slice(&x);
         // The back-EMF is the motor's, which turns on its own where play or a spring lies behind it.
         motor_before.copy_from_slice(&motor);
@@ -93,7 +91,10 @@ fn follow(plant: &mut impl Robot, drives: &[Drive], told: &Told, clock: &Clock) 
         for j in 0..n {
             let target = if step < settling { first[j] } else { told.target(j, t, clock, drives[j].latency) };
             pushes[j] = push(&drives[j], target - x[j]);
-            tau[j] = pushes[j] - drives[j].damping * (motor[j] - motor_before[j]) / STEP;
+            // Its speed now: the mean over the step before is that of half a step ago.
+            let speed = (motor[j] - motor_before[j]) / h;
+            tau[j] = pushes[j] - drives[j].damping * (1.5 * speed - 0.5 * speed_before[j]);
+            speed_before[j] = speed;
         }
         plant.step(&mut x, &tau);
         for j in 0..n {
@@ -117,9 +118,9 @@ fn follow(plant: &mut impl Robot, drives: &[Drive], told: &Told, clock: &Clock) 
             }
         }
         while let Some(&time) = told.times.get(next)
-            && time <= t + STEP
+            && time <= t + h
         {
-            let along = ((time - t) / STEP).clamp(0.0, 1.0);
+            let along = ((time - t) / h).clamp(0.0, 1.0);
             for j in 0..n {
                 ran.position[j].push(before[j] + along * (x[j] - before[j]));
             }

@@ -91,7 +91,12 @@ fn actuator(joint: &str, drive: &DriveModel) -> Option<String> {
         let torque = short(drive.torque_per_unit * limit);
         text += &format!(" forcerange=\"-{torque} {torque}\"");
     }
-    Some(text + "/>")
+    text += "/>";
+    if drive.feedforward != 0.0 {
+        // A position actuator has no term for it.
+        text += &format!("  <!-- and {} N m s/rad times the set point's speed -->", short(drive.feedforward));
+    }
+    Some(text)
 }
 
 /// A number to four digits, as a file takes it.
@@ -112,6 +117,7 @@ mod tests {
             feedback: 2.0,
             gain: None,
             damping: 0.0123456,
+            feedforward: 0.0,
             latency: 0.0,
             limit: Some(6.0),
             speed_limit: None,
@@ -121,6 +127,8 @@ mod tests {
         };
         let said = actuator("elbow", &drive).unwrap();
         assert_eq!(said, r#"<position joint="elbow" kp="0.5" kv="0.01235" forcerange="-1.5 1.5"/>"#);
+        let fed = actuator("elbow", &DriveModel { feedforward: 0.02, ..drive.clone() }).unwrap();
+        assert!(fed.ends_with("/>  <!-- and 0.02 N m s/rad times the set point's speed -->"), "{fed}");
         assert_eq!(actuator("elbow", &DriveModel { follows: Signal::Effort, ..drive }), None);
         let model = ServoModel {
             schema: gapscope_servo::MODEL_SCHEMA.into(),

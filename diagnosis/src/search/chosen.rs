@@ -80,9 +80,12 @@ impl Chosen {
         self.exact.entries.iter().any(|e| e.candidate.turns())
     }
 
-    /// Whether it leaves some joint less than another account, by as much as concerns anyone.
+    /// Whether it leaves some joint less than another account, by as much as concerns anyone, or the other has links that are
+    /// what they hardly can be.
     pub(crate) fn concerns_beside(&self, other: &Chosen) -> bool {
+        let farther = self.exact.far(&self.fit) - other.exact.far(&other.fit);
         climb::is_material(&self.exact, &other.exact.left(&other.fit), &self.exact.left(&self.fit))
+            || farther >= PRICE_OF_ODD.get()
     }
 
     /// Whether a drive turns on its own, and has the rotor that does.

@@ -162,13 +162,15 @@ impl Problem {
         }
         let score = self.score().at(evidence.noise.clone());
         // The coefficients are those of the fit, which knows more bounds than each its own.
-        let far = |of: &dyn Fn(usize) -> bool| -> f64 {
-            let own = fit.columns.iter().zip(&fit.theta).filter(|(c, _)| of(**c));
-            -0.5 * own.map(|(&c, t)| (t / score.spread[c]).powi(2)).sum::<f64>()
-        };
-        evidence.occam = score.solve(&fit.columns).map_or(f64::NEG_INFINITY, |solved| solved.occam + far(&|_| true));
-        evidence.far = far(&|c| self.prior[c] > 0.0);
+        let far: f64 = fit.columns.iter().zip(&fit.theta).map(|(&c, t)| (t / score.spread[c]).powi(2)).sum();
+        evidence.occam = score.solve(&fit.columns).map_or(f64::NEG_INFINITY, |solved| solved.occam - 0.5 * far);
+        evidence.far = self.far(fit);
         evidence
+    }
+
+    /// Nats that a fit costs by how far bodies lie from the URDF, less than nothing: all of which a card says how far it may be.
+    pub fn far(&self, fit: &Fit) -> f64 {
+        -0.5 * fit.columns.iter().zip(&fit.theta).map(|(&c, t)| self.prior[c] * t * t).sum::<f64>()
     }
 }
 

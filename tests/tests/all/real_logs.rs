@@ -163,9 +163,15 @@ fn double_pendulum_shrinks() {
 
 #[test]
 fn single_runs_of_the_double_pendulum_shrink() {
-    for run in ["run_055640", "run_060143", "slow_74s"] {
+    for run in ["run_055640", "run_060143"] {
         shrinks("double_pendulum", run);
     }
+}
+
+#[test]
+#[ignore = "a log of 74 s takes a minute: cargo test -p gapscope-tests -- --ignored a_long_run"]
+fn a_long_run_of_the_double_pendulum_shrinks() {
+    shrinks("double_pendulum", "slow_74s");
 }
 
 /// A corrected model that is worse on held-out data than the nominal one is no correction: better none at all.

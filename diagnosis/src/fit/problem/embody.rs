@@ -151,4 +151,25 @@ mod tests {
         let free = problem.solve_unbounded(&fit.columns, &problem.total);
         assert!(body.divergence(&own(&free)).is_none(), "{free:?}");
     }
+
+    /// A thin rod whose middle lies beside its line: the first moment alone would leave no body, and the way to the second
+    /// moments that make it one leads along the edge.
+    #[test]
+    fn a_body_far_from_a_rod_is_found() {
+        let model = gapscope_dynamics::robots::model("double_pendulum").unwrap().unwrap().model;
+        let beside = [0.0, 0.06, 0.0, 0.0, 0.0, 0.0, 1e-2, 0.0, 0.0, 1e-2];
+        let added = |s: &crate::record::signals::Signals, k: usize| -> f64 {
+            let at = |x: &[Vec<f64>]| [x[0][k], x[1][k]];
+            let (mut data, mut block) = (gapscope_dynamics::Data::new(&model), nalgebra::DMatrix::zeros(2, 20));
+            model.regressor(&mut data, &at(&s.q), &at(&s.v), &at(&s.a), &mut block);
+            (0..10).map(|i| block[(0, i)] * beside[i]).sum()
+        };
+        let (signals, _, problem, fit) = fitted(Kind::LinkInertiaError, |s| {
+            let torque: Vec<f64> = (0..s.len()).map(|k| added(s, k)).collect();
+            s.tau[0].iter_mut().zip(torque).for_each(|(tau, torque)| *tau += torque);
+        });
+        let all: Vec<f64> = signals.iter().flat_map(|s| (0..s.len()).map(|k| added(s, k).powi(2))).collect();
+        let part = problem.left(&fit)[0] / (all.iter().sum::<f64>() / all.len() as f64);
+        assert!(part < 1e-4, "{part} of the torque of a bent rod is left: {:?}", fit.theta);
+    }
 }

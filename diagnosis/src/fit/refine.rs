@@ -11,11 +11,13 @@ use gapscope_effects::{Candidate, Effect, EffectError, Kind, Motion, Plant};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Rounds, at most.
-const ROUNDS: usize = 30;
-/// Change of the misfit, see [`Problem::misfit`], at which torque that bends with the coefficients has settled: a twentieth of
-/// a nat. Friction under load that passes for a gain comes nearer by a part of the way each time.
-const SETTLED_BENT: f64 = 0.1;
+/// Rounds that knobs have to settle, at most.
+const ROUNDS: usize = 8;
+/// Rounds, at most, where knobs have settled and torque still bends with the coefficients.
+const ROUNDS_FOR_BENT: usize = 20;
+/// Change of a coefficient, in standard errors that it would have if all others were known, at which torque that bends with the
+/// coefficients has settled. Friction under load that passes for a gain comes nearer by a part of the way each time.
+const SETTLED_BENT: f64 = 0.3;
 /// Relative change of a knob at which it has settled.
 const SETTLED: f64 = 2e-3;
 /// Rounds, at most, where a drive turns on its own: friction behind it comes nearer by a part of the way each time.
@@ -218,7 +220,7 @@ impl Data<'_> {
         let set: Vec<usize> = (0..terms.len()).collect();
         let mut found: Option<Bend> = None;
         let bends = candidates.iter().any(|c| c.kind.card().bends);
-        let mut misfit_before = f64::INFINITY;
+        let mut theta_before = Vec::new();
         let turns = candidates.iter().any(Candidate::turns);
         let most = if turns { ROUNDS_OF_TURNING } else { ROUNDS };
         let mut settled = !turns;
@@ -264,9 +266,9 @@ impl Data<'_> {
                     }
                 }
             }
-            let misfit = problem.misfit(&fit, self.band);
-            let still = !bends || turns || (misfit - misfit_before).abs() < SETTLED_BENT;
-            misfit_before = misfit;
+            let still = !bends || turns || problem.moved(&fit, &theta_before) < SETTLED_BENT;
+            theta_before.clone_from(&fit.theta);
+            let most = if change < SETTLED && bends { most.max(ROUNDS_FOR_BENT) } else { most };
             if round >= most || (round >= 1 && change < SETTLED && settled && still) {
                 if let Some(last) = &reached
                     && data.look(&problem, &fit)?.1 > last.misfit

@@ -55,8 +55,8 @@ impl Record<'_> {
                 chosen = without;
                 continue;
             }
-            if let Some(next) = self.spread(&chosen, kind)? {
-                chosen = next;
+            if let Some(next) = self.spread(&chosen, kind, progress)? {
+                chosen = Chosen { tried: chosen.tried, needed: chosen.needed, ..next };
                 continue;
             }
             let doubtful = |rival: &&Rival| !kind.is_calibration() && odds.min(rival.odds) < DOUBTFUL;
@@ -96,7 +96,7 @@ impl Record<'_> {
     /// What was chosen with another of its kinds in the joints of one kind, where that is likelier: what is in some joints of a
     /// robot is likelier in one more than something else is. In a first look a law that reads the torque found stands beside
     /// the torque of another account.
-    fn spread(&self, chosen: &Chosen, kind: Kind) -> Result<Option<Chosen>, EffectError> {
+    fn spread(&self, chosen: &Chosen, kind: Kind, progress: Progress<'_>) -> Result<Option<Chosen>, EffectError> {
         let entry = |c: &usize| &chosen.all.entries[*c].candidate;
         let (own, rest): (Vec<usize>, Vec<usize>) = chosen.choice.set.iter().partition(|c| entry(c).kind == kind);
         for other in climb::kinds(&chosen.all, &rest) {
@@ -114,7 +114,9 @@ impl Record<'_> {
             let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
             let next = chosen.with(Choice { set }, exact, fit);
             if next.odds_against(chosen, self)? > 0.0 {
-                return Ok(Some(next));
+                // The first look at all candidates is to be around this account.
+                let Chosen { all, choice, noise, turned, .. } = next;
+                return Ok(Some(self.converge(all, choice, noise, turned, progress)?));
             }
         }
         Ok(None)

@@ -15,9 +15,11 @@ use std::sync::Arc;
 const ROUNDS: usize = 8;
 /// Rounds, at most, where knobs have settled and torque still bends with the coefficients.
 const ROUNDS_FOR_BENT: usize = 20;
-/// Change of a coefficient, in standard errors that it would have if all others were known, at which torque that bends with the
-/// coefficients has settled. Friction under load that passes for a gain comes nearer by a part of the way each time.
-const SETTLED_BENT: f64 = 0.3;
+/// Rounds, at least, where some torque bends with the coefficients, ...
+const ROUNDS_OF_BENT: usize = 6;
+/// ... and the change of the misfit, see [`Problem::misfit`], at which it has settled then: a twentieth of a nat. Friction under
+/// load that passes for a gain comes nearer by a part of the way each time.
+const SETTLED_BENT: f64 = 0.1;
 /// Relative change of a knob at which it has settled.
 const SETTLED: f64 = 2e-3;
 /// Rounds, at most, where a drive turns on its own: friction behind it comes nearer by a part of the way each time.
@@ -220,7 +222,7 @@ impl Data<'_> {
         let set: Vec<usize> = (0..terms.len()).collect();
         let mut found: Option<Bend> = None;
         let bends = candidates.iter().any(|c| c.kind.card().bends);
-        let mut theta_before = Vec::new();
+        let mut misfit_before = f64::INFINITY;
         let turns = candidates.iter().any(Candidate::turns);
         let most = if turns { ROUNDS_OF_TURNING } else { ROUNDS };
         let mut settled = !turns;
@@ -266,8 +268,9 @@ impl Data<'_> {
                     }
                 }
             }
-            let still = !bends || turns || problem.moved(&fit, &theta_before) < SETTLED_BENT;
-            theta_before.clone_from(&fit.theta);
+            let misfit = problem.misfit(&fit, self.band);
+            let still = !bends || round >= ROUNDS_OF_BENT && (turns || (misfit - misfit_before).abs() < SETTLED_BENT);
+            misfit_before = misfit;
             let most = if change < SETTLED && bends { most.max(ROUNDS_FOR_BENT) } else { most };
             if round >= most || (round >= 1 && change < SETTLED && settled && still) {
                 if let Some(last) = &reached

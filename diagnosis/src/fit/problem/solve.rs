@@ -1,7 +1,6 @@
 //! Fits of any subset of the columns: bounded least squares on normal equations, held out by folds, and their covariance.
 
 use super::Problem;
-use crate::fit::estimate::Fit;
 use crate::numbers::factor::Factor;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -195,16 +194,6 @@ impl Problem {
         }
         // Held and let go in turn: within the bounds it is good enough.
         theta.iter().zip(columns).map(|(theta, &c)| theta.clamp(self.bounds[c].0, self.bounds[c].1)).collect()
-    }
-
-    /// The greatest change of a fit's coefficients from what they were `before`, in standard errors that each would have if all
-    /// others were known; infinite where there were not as many.
-    pub fn moved(&self, fit: &Fit, before: &[f64]) -> f64 {
-        if before.len() != fit.theta.len() {
-            return f64::INFINITY;
-        }
-        let of = |((&c, now), before): ((&usize, &f64), &f64)| (now - before).abs() * self.total.gram[(c, c)].sqrt();
-        fit.columns.iter().zip(&fit.theta).zip(before).map(of).fold(0.0, f64::max)
     }
 
     /// Weighted inner products of some columns with others, over all rows.

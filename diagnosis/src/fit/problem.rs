@@ -293,22 +293,23 @@ impl Problem {
         self.accumulate(band);
     }
 
-    /// Writes new values, `[run][column]`, over the columns from `begin` on. A joint that a column does not act on keeps what it has.
+    /// Writes new values, `[run][column]`, over the columns from `begin` on. A joint that a column does not act on keeps what
+    /// it has.
     fn fill(&mut self, signals: &[Signals], band: &Band, standstill: &[f64], begin: usize, runs: &[Vec<Column>]) {
         let width = runs.first().map_or(0, Vec::len);
         self.joints.par_iter_mut().enumerate().for_each(|(j, rows)| {
             let m = rows.columns.len();
+            let counts: Vec<_> = signals.iter().map(|s| s.slides(j, standstill[j])).collect();
             for i in 0..width {
-                let of_joint = |run: &'_ Vec<Column>| run[i].rows.iter().any(|(row, _)| *row == j);
+                let of_joint = |run: &Vec<Column>| run[i].rows.iter().any(|(row, _)| *row == j);
                 let Some(at) = rows.columns.iter().position(|&column| column == begin + i) else { continue };
                 if !runs.iter().any(of_joint) {
                     continue;
                 }
                 let mut values = vec![0.0; band.rows.len()];
-                for (e, (s, run)) in signals.iter().zip(runs).enumerate() {
-                    let counts = s.slides(j, standstill[j]);
+                for (e, run) in runs.iter().enumerate() {
                     for (_, x) in run[i].rows.iter().filter(|(row, _)| *row == j) {
-                        for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts, x)) {
+                        for (row, x) in band.of_episode[e].clone().zip(band.filter_where(e, &counts[e], x)) {
                             values[row] = x.unwrap_or(0.0);
                         }
                     }

@@ -208,8 +208,8 @@ impl Data<'_> {
         self.refine_from(candidates, None)
     }
 
-    /// The same from coefficients that the candidates had before, see [`Fit::coefficients`], where they had any: a drive that turns on its own begins
-    /// with the rotor of its account.
+    /// The same from coefficients that the candidates had before, see [`Fit::coefficients`], where they had any: a drive that
+    /// turns on its own begins with the rotor of its account.
     ///
     /// # Errors
     /// An effect that the robot cannot have.

@@ -167,8 +167,8 @@ impl Signals {
         self.pushed.iter().flatten().any(|edge| (time - edge).abs() < EDGE)
     }
 
-    /// The samples at which a joint slides and nothing outside begins or ends to push. A slow log is smoothed so widely that its effort before and after a reversal runs
-    /// together: there the sign of the speed says nothing for as long.
+    /// The samples at which a joint slides and nothing outside begins or ends to push. A slow log is smoothed so widely that
+    /// its effort before and after a reversal runs together: there the sign of the speed says nothing for as long.
     pub fn slides(&self, joint: usize, standstill: f64) -> Vec<bool> {
         let stands: Vec<bool> = self.v[joint].iter().map(|v| v.abs() < standstill).collect();
         let wide = (self.held.len() as f64 / 2.0 - 1.0) * self.raw.dt - DERIVATIVE_HALF_WIDTH;

@@ -99,8 +99,11 @@ impl Record<'_> {
     fn spread(&self, chosen: &Chosen, kind: Kind, progress: Progress<'_>) -> Result<Option<Chosen>, EffectError> {
         let entry = |c: &usize| &chosen.all.entries[*c].candidate;
         let (own, rest): (Vec<usize>, Vec<usize>) = chosen.choice.set.iter().partition(|c| entry(c).kind == kind);
+        if kind.is_calibration() {
+            return Ok(None);
+        }
         for other in climb::kinds(&chosen.all, &rest) {
-            if kind.is_calibration() || other.is_calibration() || other.is_outside() || !other.card().reads_found {
+            if other.is_calibration() || other.is_outside() || !other.card().reads_found {
                 continue;
             }
             let there =
@@ -122,9 +125,9 @@ impl Record<'_> {
         Ok(None)
     }
 
-    /// What was chosen without candidates of which every interval holds nothing, one by one: what blocks of time do not agree on was
-    /// not shown by them. Links stay, of which the URDF says what they may be. Where nothing of a kind is left, what else there
-    /// is has its turn without it.
+    /// What was chosen without candidates of which every interval holds nothing, one by one: what blocks of time do not agree
+    /// on was not shown by them. Links stay, of which the URDF says what they may be. Where nothing of a kind is left, what else
+    /// there is has its turn without it.
     pub(crate) fn shown(&self, mut chosen: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let speeds = speeds(&self.signals, &self.band, self.model.dof());
         for kind in climb::kinds(&chosen.all, &chosen.choice.set) {

@@ -29,13 +29,13 @@ impl Plant {
                 continue;
             }
             let needed: Vec<f64> = out[j].iter().zip(&dry[j]).map(|(rest, dry)| rest + dry).collect();
-            let mut bound = |k: usize| {
+            // Friction under load is bounded by the effort, whose noise is in every sample as well.
+            let bound = |k: usize| {
                 delivered[j] = self.actuation.at_joint(j, tau[j][k]);
                 let time = motion.start + k as f64 * motion.dt;
                 direction.bound(motion.v[j][k], time, &delivered).max(0.0)
             };
-            // Friction under load is bounded by the effort, whose noise is in every sample as well.
-            let bounds: Vec<f64> = (0..motion.len()).map(&mut bound).collect();
+            let bounds: Vec<f64> = (0..motion.len()).map(bound).collect();
             let mean = |x: &[f64]| smoothed(x, HOLDS_OVER, motion.dt);
             let (likely, limit) = (mean(&needed), mean(&bounds));
             for k in (0..motion.len()).filter(rests) {

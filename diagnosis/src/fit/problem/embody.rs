@@ -1,6 +1,6 @@
 //! Fits whose links are bodies: to the deviance comes, for each link, a little of its log-det divergence from the URDF
-//! ([`gapscope_effects::Body`]), and Newton's method with a line search finds the least of the sum (an interior point method: Boyd, Vandenberghe, Convex
-//! Optimization, 2004, chapter 11).
+//! ([`gapscope_effects::Body`]), and Newton's method with a line search finds the least of the sum (an interior point
+//! method: Boyd, Vandenberghe, Convex Optimization, 2004, chapter 11).
 
 use super::Problem;
 use gapscope_effects::Body;

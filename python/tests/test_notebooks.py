@@ -54,15 +54,7 @@ def run(name, folder, data, monkeypatch):
     client.execute()
 
 
-#: What fails today, and why.
-FAILS = {}
-
-
-def marked(name):
-    return pytest.param(name, marks=pytest.mark.xfail(reason=FAILS[name])) if name in FAILS else name
-
-
-@pytest.mark.parametrize("name", [marked(name) for name in sorted(HOLDS)])
+@pytest.mark.parametrize("name", sorted(HOLDS))
 def test_a_notebook_runs_on_simulated_logs(name, tmp_path, monkeypatch):
     run(name, tmp_path, tmp_path / "none", monkeypatch)
 

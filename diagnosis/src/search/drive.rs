@@ -216,13 +216,17 @@ impl<'a> Study<'a> {
                 let measures = self.first_measures(episode, &first, &open);
                 let mut tried: Vec<(f64, Candidate, f64)> =
                     measures.into_iter().zip(open).map(|(measure, (drive, rotor))| (measure, drive, rotor)).collect();
+                // Where a rigid drive leaves less than all of them, none near them leaves little.
+                tried.retain(|(measure, ..)| *measure < 0.0);
                 tried.sort_by(|a, b| a.0.total_cmp(&b.0));
                 tried.truncate(FIRST);
                 let descended: Vec<(Candidate, f64)> =
                     tried.iter().map(|(_, drive, rotor)| self.descend(drive.clone(), *rotor)).collect();
                 let tried = tried.into_iter().map(|(_, drive, rotor)| (drive, rotor)).chain(descended).map(measured);
                 let first = tried.min_by(|a, b| a.0.total_cmp(&b.0));
-                let Some((_, first, rotor)) = first.filter(|(least, ..)| *least < 0.0) else { continue };
+                // To turn what is nowhere near takes most of the time, and it does not come near by it.
+                let promises = |(_, drive, rotor): &(f64, Candidate, f64)| self.promises(drive, *rotor);
+                let Some((_, first, rotor)) = first.filter(promises) else { continue };
                 let (drive, rotor) = self.turn(first, rotor);
                 // Its own filter is another now.
                 let (drive, rotor) = if self.through { self.turn(drive, rotor) } else { (drive, rotor) };

@@ -21,35 +21,41 @@ impl Record<'_> {
     /// Puts a spring or play in the drive of one joint where the logs speak for it: beside all else that was found, beside the
     /// calibration alone, and where noise may have drowned what a spring does, through a filter.
     pub(crate) fn drive(&self, rigid: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        let mut joints = self.restless(&rigid)?;
-        // What was found beyond calibration may stand in for a drive.
-        if rigid.exact.entries.iter().any(|e| !e.candidate.kind.is_calibration() && !e.candidate.kind.is_outside()) {
-            joints.extend((0..self.model.dof()).filter(|j| self.moving[*j] && !joints.contains(j)).collect::<Vec<_>>());
-        }
-        if joints.is_empty() {
-            return Ok(rigid);
-        }
         // Beside what was found, beside its calibration alone, fitted anew without rotors, and beside the best calibration.
         let without_rotors = |of: &Chosen| {
             let entries = &of.exact.entries;
             let beside = (0..entries.len()).filter(|&i| !entries[i].candidate.kind.card().rotor).collect();
             (of.exact.clone(), Fit { set: beside, ..of.fit.clone() })
         };
-        let mut bases = vec![(without_rotors(&rigid), rigid.choice.clone(), false)];
+        let restless = |beside: &(Problem, Fit)| self.restless(&rigid.noise, beside);
+        // What was found beyond calibration may stand in for a drive: beside calibration alone more is left.
+        let joints = restless(&(rigid.exact.clone(), rigid.fit.clone()))?;
+        let mut bases = vec![(without_rotors(&rigid), rigid.choice.clone(), joints, false)];
         if climb::kinds(&rigid.all, &rigid.choice.set).into_iter().any(|kind| !kind.is_calibration()) {
             let calibration = |c: &&Candidate| c.kind.is_calibration() && !c.kind.card().rotor;
             let bodies: Vec<Candidate> =
                 rigid.exact.entries.iter().map(|e| &e.candidate).filter(calibration).cloned().collect();
             let mut choice = rigid.choice.clone();
             choice.set.retain(|&c| rigid.all.entries[c].candidate.kind.is_calibration());
-            bases.push((self.data(&rigid.noise).refine(&bodies)?, choice, false));
             let calibrated = self.calibrated(&rigid, progress)?;
-            bases.push((without_rotors(&calibrated), calibrated.choice, false));
+            let has_rotor = calibrated.exact.entries.iter().any(|e| e.candidate.kind.card().rotor);
+            if has_rotor || calibrated.choice.set != choice.set {
+                let anew = self.data(&rigid.noise).refine(&bodies)?;
+                let joints = restless(&anew)?;
+                bases.push((anew, choice, joints, false));
+            }
+            let joints = restless(&(calibrated.exact.clone(), calibrated.fit.clone()))?;
+            bases.push((without_rotors(&calibrated), calibrated.choice, joints, false));
         }
-        bases.push((without_rotors(&rigid), rigid.choice.clone(), true));
+        let any = |j: &usize| bases.iter().any(|(_, _, joints, _)| joints.contains(j));
+        let joints: Vec<usize> = (0..self.model.dof()).filter(any).collect();
+        if joints.is_empty() {
+            return Ok(rigid);
+        }
+        bases.push((without_rotors(&rigid), rigid.choice.clone(), joints, true));
         let mut best: Option<Chosen> = None;
         let mut tried: Vec<(Candidate, f64)> = Vec::new();
-        for (others, base, through) in bases {
+        for (others, base, joints, through) in bases {
             if through && best.is_some() {
                 break;
             }
@@ -123,13 +129,13 @@ impl Record<'_> {
         self.converge(all, choice, rigid.noise.clone(), None, progress)
     }
 
-    /// Joints of which more than noise is left, those with most of it first.
-    fn restless(&self, chosen: &Chosen) -> Result<Vec<usize>, EffectError> {
-        let rest = self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?;
+    /// Joints of which a fit leaves more than noise, those with most of it first.
+    fn restless(&self, noise: &[f64], (exact, fit): &(Problem, Fit)) -> Result<Vec<usize>, EffectError> {
+        let rest = self.data(noise).rest(exact, fit)?;
         let floor = noise_floor(&self.signals, &self.band, &rest, self.model.dof());
         // Play shows for moments alone: what it leaves then counts in full.
-        let left = chosen.exact.left(&chosen.fit);
-        let calm = |j: usize| floor[j].min(chosen.exact.sigma[j]).max(f64::MIN_POSITIVE);
+        let left = exact.left(fit);
+        let calm = |j: usize| floor[j].min(exact.sigma[j]).max(f64::MIN_POSITIVE);
         let level = |j: usize| left[j].sqrt() / calm(j);
         let mut joints: Vec<usize> =
             (0..self.model.dof()).filter(|&j| self.moving[j] && level(j) > FLOOR_KNOWN_TO.get()).collect();

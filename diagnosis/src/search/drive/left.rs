@@ -110,6 +110,12 @@ impl Study<'_> {
         mean_logarithm(self.left(drive, rotor, &rigid)) - mean_logarithm(&rigid.left)
     }
 
+    /// Whether a drive that was not turned yet is half way to what [`beyond_doubt`] asks of it.
+    pub(super) fn promises(&self, drive: &Candidate, rotor: f64) -> bool {
+        let rigid = self.against(drive, rotor);
+        leaves(NOT_RIGID_LEAVES.get().sqrt(), &rigid, &self.left(drive, rotor, &rigid))
+    }
+
     /// A first look at the same of several drives with their rotors: of one episode alone, and with a rigid drive's noise.
     pub(super) fn first_measures(&self, episode: Option<usize>, plain: &Rigid, all: &[(Candidate, f64)]) -> Vec<f64> {
         let measure = |rows: Vec<f64>, rigid: &Rigid, view: View| {
@@ -201,16 +207,21 @@ pub(super) fn tells(rigid: &Rigid, left: &[f64]) -> bool {
     left.iter().filter(|left| **left > 2.0 * rigid.nothing).count() >= 2
 }
 
+/// Whether an account leaves this part, or less, of what a rigid drive leaves: in all, or of the blocks of time in the mean of
+/// logarithms, as a burst of chatter is one block.
+fn leaves(part: f64, rigid: &Rigid, with: &[f64]) -> bool {
+    let gain = mean(&rigid.left.iter().zip(with).map(|(r, d)| (r / d).ln()).collect::<Vec<_>>());
+    gain > -part.ln() || mean(with) < part * mean(&rigid.left)
+}
+
 /// By how many standard errors less is left of the blocks with an account than by a rigid drive, where that is beyond
 /// doubt and worth it.
 pub(super) fn beyond_doubt(rigid: &Rigid, with: &[f64]) -> Option<f64> {
-    let ratios = || rigid.left.iter().zip(with);
-    let gain = mean(&ratios().map(|(r, d)| (r / d).ln()).collect::<Vec<_>>());
+    let ratios = rigid.left.iter().zip(with);
     let telling: Vec<f64> =
-        ratios().filter(|(r, d)| r.max(**d) > 2.0 * rigid.nothing).map(|(r, d)| (r / d).ln()).collect();
+        ratios.filter(|(r, d)| r.max(**d) > 2.0 * rigid.nothing).map(|(r, d)| (r / d).ln()).collect();
     let beyond = telling.iter().sum::<f64>() / mean_square(&telling).sqrt() / (telling.len().max(1) as f64).sqrt();
-    (beyond > 0.0 && (gain > -NOT_RIGID_LEAVES.get().ln() || mean(with) < NOT_RIGID_LEAVES.get() * mean(&rigid.left)))
-        .then_some(beyond)
+    (beyond > 0.0 && leaves(NOT_RIGID_LEAVES.get(), rigid, with)).then_some(beyond)
 }
 
 /// What is taken off for the noise of an account: what a rigid drive has of it at most, as play is so sensitive that noise

@@ -276,15 +276,53 @@ pub fn standstill(signals: &[Signals], joints: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Standard deviation of white noise on a smooth signal, from the median size of its fourth differences (1, −4, 6, −4, 1).
+/// Standard deviation of white noise on a smooth signal, from the lesser half of its fourth differences (1, −4, 6, −4, 1).
+/// Of an encoder those are whole counts: their median would be one as well, and be off by up to a third. Where five samples
+/// are the same nothing moved.
 fn white_noise(x: &[f64]) -> f64 {
-    let mut size: Vec<f64> =
-        x.windows(5).map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs()).filter(|d| *d > 0.0).collect();
-    if size.is_empty() {
+    let moved = |w: &&[f64]| w.iter().any(|x| *x != w[0]);
+    let fourth = |w: &[f64]| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];
+    let mut squares: Vec<f64> = x.windows(5).filter(moved).map(|w| fourth(w).powi(2)).collect();
+    let half = squares.len() / 2;
+    if half == 0 {
         return 0.0;
     }
-    let middle = size.len() / 2;
-    let (_, median, _) = size.select_nth_unstable_by(middle, f64::total_cmp);
-    // 70 = Σ of the squared weights; 0.6745 = median of |N(0, 1)|.
-    *median / (0.6745 * 70f64.sqrt())
+    squares.select_nth_unstable_by(half, f64::total_cmp);
+    let mean = squares[..half].iter().sum::<f64>() / half as f64;
+    // 70 = Σ of the squared weights; 0.1426 = mean square of the lesser half of N(0, 1).
+    (mean / (0.1426 * 70.0)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64;
+
+    #[test]
+    fn noise_of_an_encoder_is_told_though_it_counts_in_steps() {
+        for (step, amplitude) in [(1e-5, 0.3), (1e-4, 0.5), (1e-3, 1.0)] {
+            let counts: Vec<f64> = (0..2000)
+                .map(|k| {
+                    let exact: f64 = amplitude * (0.02 * k as f64).sin();
+                    step * (exact / step).round()
+                })
+                .collect();
+            let (told, true_size) = (white_noise(&counts), step / 12f64.sqrt());
+            assert!((told / true_size - 1.0).abs() < 0.08, "{step}: {told} for {true_size}");
+        }
+    }
+
+    #[test]
+    fn noise_is_told_beside_jolts_and_a_joint_that_stands() {
+        let mut random = Pcg64::seed_from_u64(1);
+        let mut noisy: Vec<f64> = (0..4000).map(|_| 0.01 * random.sample::<f64, _>(StandardNormal)).collect();
+        noisy.iter_mut().step_by(100).for_each(|x| *x += 5.0);
+        noisy.extend([noisy[3999]; 3000]);
+        let told = white_noise(&noisy);
+        assert!((told / 0.01 - 1.0).abs() < 0.1, "{told}");
+        assert_eq!(white_noise(&[1.0; 50]), 0.0);
+        assert_eq!(white_noise(&[1.0, 2.0]), 0.0);
+    }
 }

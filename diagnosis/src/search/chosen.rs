@@ -2,7 +2,6 @@
 
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
-use crate::fit::terms::Entry;
 use crate::numbers::decide::PRICE_OF_ODD;
 use crate::record::data::Data;
 use crate::search::climb;
@@ -49,10 +48,20 @@ pub(crate) struct Turned {
 }
 
 impl Chosen {
-    /// Whether a law in it filters what was measured and is not in another.
+    /// Whether a law in it filters what was measured and is not in another, at any knob.
     pub(crate) fn filters_beyond(&self, other: &Chosen) -> bool {
-        let has = |e: &Entry| other.exact.entries.iter().any(|other| other.candidate == e.candidate);
-        self.exact.entries.iter().any(|e| e.candidate.kind.card().filters() && !has(e))
+        self.filters_where(|own| {
+            other.exact.entries.iter().all(|e| (e.candidate.kind, &e.candidate.joints) != (own.kind, &own.joints))
+        })
+    }
+
+    /// Whether a law in it filters what was measured otherwise than another does.
+    pub(crate) fn filters_unlike(&self, other: &Chosen) -> bool {
+        self.filters_where(|own| other.exact.entries.iter().all(|e| e.candidate != *own))
+    }
+
+    fn filters_where(&self, is_new: impl Fn(&Candidate) -> bool) -> bool {
+        self.exact.entries.iter().any(|e| e.candidate.kind.card().filters() && is_new(&e.candidate))
     }
 
     /// Log probability of the account before any log is seen.

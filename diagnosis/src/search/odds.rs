@@ -12,7 +12,7 @@ impl Chosen {
     pub fn odds_against(&self, other: &Chosen, logs: &Record<'_>) -> Result<f64, EffectError> {
         let (own, others) = (logs.rest(self)?, logs.rest(other)?);
         let filtered =
-            (self.filters_beyond(other) || other.filters_beyond(self)) && logs.noisier.len() == logs.signals.len();
+            (self.filters_unlike(other) || other.filters_unlike(self)) && logs.noisier.len() == logs.signals.len();
         let equalizers = filtered.then(|| logs.at_one_noise([(self, &own), (other, &others)])).transpose()?;
         let at = |i: usize| equalizers.as_ref().map(|both| &both[i]);
         // What is left of the better account is nearer to noise: it says how many rows of a rest count as one.

@@ -42,7 +42,7 @@ impl Data<'_> {
                 let &[j] = problem.entries[c].candidate.joints.as_slice() else { return None };
                 let mut folds = vec![Vec::new(); self.band.folds];
                 for (e, s) in self.signals.iter().enumerate() {
-                    let still: Vec<bool> = s.v[j].iter().map(|v| v.abs() < self.standstill[j]).collect();
+                    let still = s.rests(j, self.standstill[j]);
                     let rows = self.band.of_episode[e].clone().zip(self.band.filter_where(e, &still, &rest[e][j]));
                     for (row, x) in rows {
                         folds[self.band.rows[row].fold].push(x);

@@ -167,6 +167,12 @@ impl Signals {
         self.pushed.iter().flatten().any(|edge| (time - edge).abs() < EDGE)
     }
 
+    /// The samples at which a joint rests and bears nothing but what its drive does. Friction hides when a push begins and
+    /// ends, so that no rest of a log with pushes tells.
+    pub fn rests(&self, joint: usize, standstill: f64) -> Vec<bool> {
+        self.v[joint].iter().map(|v| v.abs() < standstill && self.pushed.is_empty()).collect()
+    }
+
     /// The samples at which a joint slides and nothing outside begins or ends to push. A slow log is smoothed so widely that
     /// its effort before and after a reversal runs together: there the sign of the speed says nothing for as long.
     pub fn slides(&self, joint: usize, standstill: f64) -> Vec<bool> {

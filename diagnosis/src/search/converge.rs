@@ -24,37 +24,16 @@ impl Record<'_> {
         progress: Progress<'_>,
     ) -> Result<Chosen, EffectError> {
         let data = self.data(&noise);
-        let open = |candidate: &Candidate| Term { candidate: candidate.clone(), tangent_at: None };
         let mut round = 0;
         let (exact, fit) = loop {
             progress("refining effects", 0.3 + 0.08 * round as f64);
             round += 1;
             let (exact, fit) = data.exact(&all, &choice.set, turned.as_ref())?;
-            // The choice again, around the parameters found: knobs turned, and what bends taken into account.
-            let changes: Vec<(usize, Candidate)> = choice
-                .set
-                .iter()
-                .zip(&exact.entries)
-                .filter(|(_, e)| !e.candidate.turns())
-                .map(|(&c, e)| (c, e.candidate.clone()))
-                .collect();
             if round == ROUNDS || choice.set.is_empty() {
                 break (exact, fit);
             }
-            // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
-            let loaded = data.loaded(&exact, &fit)?;
-            let data = Data { signals: &loaded, ..data };
-            let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind.card().reads_found;
-            let under_load = all.entries.iter().enumerate().filter(of_load);
-            let changes: Vec<(usize, Candidate)> =
-                under_load.map(|(c, e)| (c, e.candidate.clone())).chain(changes).collect();
-            all.replace(self.model, &loaded, &self.band, &self.still, &changes);
-            let at: Vec<usize> = (0..exact.entries.len()).collect();
-            let plain = data.problem(exact.entries.iter().map(|e| open(&e.candidate)).collect(), &Kind::ALL);
-            let mut plain_fit = Fit::on_all(&plain, &at);
-            carry(&fit, &exact, &plain, &mut plain_fit);
-            let found = data.bend(&plain, &plain_fit)?;
-            data.bent(&mut all, &choice.set, &found);
+            // The choice again, around the parameters found.
+            self.around(&mut all, &choice, &exact, &fit, &noise)?;
             let again = climb::choose(&mut all, &self.band, &choice.set);
             let same = again.set == choice.set;
             choice = again;
@@ -64,6 +43,35 @@ impl Record<'_> {
         };
         let (late_doubt, tried, needed) = (None, Vec::new(), Vec::new());
         Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt, tried, needed })
+    }
+
+    /// Puts all candidates around a set at its exact law: knobs turned, gears loaded, and what bends taken into account.
+    pub(crate) fn around(
+        &self,
+        all: &mut Problem,
+        choice: &Choice,
+        exact: &Problem,
+        fit: &Fit,
+        noise: &[f64],
+    ) -> Result<(), EffectError> {
+        let data = self.data(noise);
+        // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
+        let loaded = data.loaded(exact, fit)?;
+        let data = Data { signals: &loaded, ..data };
+        let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind.card().reads_found;
+        let under_load = all.entries.iter().enumerate().filter(of_load).map(|(c, e)| (c, e.candidate.clone()));
+        let rigid = |(_, e): &(&usize, &Entry)| !e.candidate.turns();
+        let found = choice.set.iter().zip(&exact.entries).filter(rigid).map(|(&c, e)| (c, e.candidate.clone()));
+        let changes: Vec<(usize, Candidate)> = under_load.chain(found).collect();
+        all.replace(self.model, &loaded, &self.band, &self.still, &changes);
+        let at: Vec<usize> = (0..exact.entries.len()).collect();
+        let open = |e: &Entry| Term { candidate: e.candidate.clone(), tangent_at: None };
+        let plain = data.problem(exact.entries.iter().map(open).collect(), &Kind::ALL);
+        let mut plain_fit = Fit::on_all(&plain, &at);
+        carry(fit, exact, &plain, &mut plain_fit);
+        let bend = data.bend(&plain, &plain_fit)?;
+        data.bent(all, &choice.set, &bend);
+        Ok(())
     }
 }
 

@@ -48,7 +48,7 @@ impl Record<'_> {
     /// What is left of a joint at the rows at which it rests, N m or N.
     pub(crate) fn at_rest(&self, joint: usize, rest: &Rest) -> Vec<Option<f64>> {
         let rows = self.signals.iter().zip(rest).enumerate().flat_map(|(e, (s, rest))| {
-            let still: Vec<bool> = s.v[joint].iter().map(|v| v.abs() < self.still[joint]).collect();
+            let still = s.rests(joint, self.still[joint]);
             self.band.filter_where(e, &still, &rest[joint])
         });
         rows.collect()

@@ -12,6 +12,7 @@ mod determined;
 mod effort;
 mod gravity;
 mod limits;
+mod merge;
 mod motion;
 mod odd;
 mod odd_effort;

@@ -217,15 +217,12 @@ fn a_wrong_unit_takes_no_ten_times_as_long_as_its_healthy_twin() {
         start.elapsed()
     };
     let healthy = timed(&|_, x| x);
-    let faults: [(&str, &dyn Fn(&str, f64) -> f64); 3] = [
-        ("ms", &|name, x| if name == "time" { 1e3 * x } else { x }),
-        ("degrees", &|name, x| if is(name, "position") { x.to_degrees() } else { x }),
-        ("opposite effort", &|name, x| if is(name, "effort") { -x } else { x }),
-    ];
-    for (name, wrong) in faults {
-        let took = timed(wrong);
+    let held = |name: &str, took: Duration| {
         assert!(took < 10 * healthy.max(Duration::from_secs(1)), "{name}: {took:?}, healthy {healthy:?}");
-    }
+    };
+    held("ms", timed(&|name, x| if name == "time" { 1e3 * x } else { x }));
+    held("degrees", timed(&|name, x| if is(name, "position") { x.to_degrees() } else { x }));
+    held("opposite effort", timed(&|name, x| if is(name, "effort") { -x } else { x }));
 }
 
 /// What lies in a folder.

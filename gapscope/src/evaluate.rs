@@ -77,6 +77,10 @@ pub fn evaluated(args: &Evaluate) -> Result<Evaluated> {
     // A table of predictions has all that the logs hold.
     let bound = args.predictions.is_none().then_some(Bound::DIAGNOSIS);
     let mut loaded = load_any(&args.input, bound, &|_| {})?;
+    if loaded.episodes.is_empty() {
+        let why = loaded.findings.first().map_or_else(String::new, |finding| format!(": {finding}"));
+        bail!("no log is long enough to hold a model against{why}. Record a second or more");
+    }
     let wanted = |table: &dyn Fn() -> String| args.predictions.as_ref().map_or_else(String::new, |_| table());
     if servo::lacks_effort(&loaded) {
         let (evaluation, paths) = servo::evaluated(args, &loaded)?;

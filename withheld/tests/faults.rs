@@ -52,6 +52,14 @@ impl Bank {
         assert!(truth.is_named(&found.faults, |log| format!("episode_{log}.csv")), "{truth:?}: {found:#?}");
     }
 
+    /// The fault is named as in [`Bank::named`], and of the right size.
+    #[track_caller]
+    fn sized(&self, index: usize, kind: FaultKind) {
+        self.named(index, kind);
+        let (truth, found) = self.case(index);
+        assert!(truth.is_sized(&found.faults), "{truth:?}: {found:#?}");
+    }
+
     /// Something is asked, and nothing is mended.
     #[track_caller]
     fn asked(&self, index: usize, kind: FaultKind) {
@@ -62,9 +70,13 @@ impl Bank {
 }
 
 #[test]
-#[ignore = "nothing is said of an effort that is .1 s late in one log: issue 24"]
 fn one_log_whose_effort_is_late_is_named_even_where_it_leaves_little() {
     ARMS.named(32, FaultKind::TimeShift);
+}
+
+#[test]
+#[ignore = "a delay of some 20 ms in two other logs looks as likely as .1 s in this one: issue 24"]
+fn one_log_whose_effort_is_late_is_named_beside_others_that_look_late() {
     ARMS.named(90, FaultKind::TimeShift);
 }
 
@@ -74,7 +86,6 @@ fn one_log_with_another_scale_in_some_joints_is_named() {
 }
 
 #[test]
-#[ignore = "one of five joints is said to have the opposite sign, and another is missed: issue 24"]
 fn one_log_without_a_sign_in_some_joints_is_named() {
     ARMS.named(73, FaultKind::EffortAbsolute);
 }
@@ -102,10 +113,8 @@ fn positions_in_turns_are_no_larger_efforts() {
 }
 
 #[test]
-#[ignore = "turns are mended with a scale 5.5 % off: issue 24"]
-fn positions_in_turns_are_asked_where_a_larger_effort_is_as_likely() {
-    // Two accounts of one joint: both are asked, none is mended.
-    WORN.asked(26, FaultKind::PositionScale);
+fn positions_in_turns_are_turns_where_bodies_would_have_them_a_little_larger() {
+    WORN.sized(26, FaultKind::PositionScale);
 }
 
 #[test]
@@ -130,7 +139,6 @@ fn an_effort_that_is_cut_off_beside_others_that_are_is_named() {
 }
 
 #[test]
-#[ignore = "five of six joints are named: issue 24"]
 fn every_effort_that_is_cut_off_is_named() {
     ARMS.named(33, FaultKind::EffortClipped);
 }

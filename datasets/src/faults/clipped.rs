@@ -19,8 +19,10 @@ const CUT: f64 = 0.08;
 const CLEAR: f64 = 6.0;
 /// Beside a clear one in the same log, or of the same joint, this part beyond is enough, ...
 const BESIDE: f64 = 0.03;
-/// ... and beside so many any.
+/// ... and beside so many any, or none where the model leaves this part of the effort, squared: it tells nothing of what lies
+/// beyond an end.
 const SEVERAL: usize = 2;
+const UNTOLD: f64 = 0.5;
 /// Fewer places tell nothing.
 const FEWEST: usize = 4;
 /// Rounds of fitting to what was cut off as the last round has it.
@@ -52,9 +54,10 @@ pub(crate) fn clipped(logs: &Logs, model: &Model, sample: &Sample, scales: &[f64
         return Vec::new();
     }
     let mut whole = sample.clone();
-    let mut predicted = Vec::new();
+    let (mut predicted, mut left) = (Vec::new(), Vec::new());
     for _ in 0..ROUNDS {
-        predicted = weigh_either(model, &whole, scales, active).predicted;
+        let weighed = weigh_either(model, &whole, scales, active);
+        (predicted, left) = (weighed.predicted, weighed.unexplained);
         predicted.iter_mut().zip(scales).for_each(|(row, scale)| row.iter_mut().for_each(|x| *x *= scale));
         for End { joint: j, places, .. } in &ends {
             for &(k, _, sign) in places {
@@ -66,12 +69,12 @@ pub(crate) fn clipped(logs: &Logs, model: &Model, sample: &Sample, scales: &[f64
     let told = |end: &End| {
         let j = end.joint;
         let at_an_end = |k: usize| ends.iter().any(|other| other.joint == j && other.places.iter().any(|p| p.0 == k));
-        let left: Vec<f64> =
+        let off: Vec<f64> =
             (0..sample.len()).filter(|&k| !at_an_end(k)).map(|k| predicted[j][k] - sample.effort[j][k]).collect();
         let further: f64 = end.places.iter().map(|&(k, _, sign)| sign * (predicted[j][k] - sample.effort[j][k])).sum();
         let part: f64 = end.places.iter().map(|place| place.1).sum();
         let beyond = further / (part * end.size);
-        (beyond, beyond > CUT && further > CLEAR * rms(&left) * (end.places.len() as f64).sqrt())
+        (beyond, beyond > CUT && further > CLEAR * rms(&off) * (end.places.len() as f64).sqrt())
     };
     let told: Vec<(f64, bool)> = ends.iter().map(told).collect();
     let mut found: BTreeMap<usize, Vec<(&End, f64)>> = BTreeMap::new();
@@ -80,17 +83,24 @@ pub(crate) fn clipped(logs: &Logs, model: &Model, sample: &Sample, scales: &[f64
         let near =
             |(other, (_, clear)): (&End, &(f64, bool))| *clear && (other.log == end.log || other.joint == end.joint);
         let beside = ends.iter().zip(&told).filter(|pair| near(*pair)).count();
-        if *clear || (beside > 0 && *beyond > BESIDE) || (beside >= SEVERAL && *beyond > 0.0) {
+        if *clear
+            || (beside > 0 && *beyond > BESIDE)
+            || (beside >= SEVERAL && (*beyond > 0.0 || left[end.joint] > UNTOLD))
+        {
             found.entry(end.joint).or_default().push((end, *beyond));
         }
     }
     let fault = |(j, ends): (usize, Vec<(&End, f64)>)| {
         let (first, beyond) = ends[0];
         let evidence = format!(
-            "{} % of the samples lie at {} or its opposite to the last digit, where the motion takes {} % more",
+            "{} % of the samples lie at {} or its opposite to the last digit, {}",
             figure(100.0 * first.share),
             figure(first.size),
-            figure(100.0 * beyond)
+            if beyond > 0.0 {
+                format!("where the motion takes {} % more", figure(100.0 * beyond))
+            } else {
+                "as those of other joints do where the motion takes more".to_owned()
+            }
         );
         let files: Vec<usize> = ends.iter().map(|(end, _)| end.log).collect();
         Fault::new(logs, FaultKind::EffortClipped, &[j], &files, None, evidence, vec![Change::NoEffort(j)])

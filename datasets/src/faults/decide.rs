@@ -122,7 +122,7 @@ impl Decision<'_> {
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (score, account, weighed) = best.first()?;
         let margin = score - (logged.0.score - logged.1);
-        let small = match account.kind {
+        let small = |account: &Account| match account.kind {
             Kind::Zero => logs.is_prismatic(account.joints[0]) || account.value.abs() < ZERO,
             Kind::Scale | Kind::Clock => (effort::GAINS.0..effort::GAINS.1).contains(&account.value),
             Kind::Gravity => account.gravity.is_some_and(|gravity| {
@@ -132,7 +132,7 @@ impl Decision<'_> {
             Kind::Order => !are_exchanged(&account.joints, &logged.0.unexplained, &weighed.unexplained, 2.0 * OWN),
             Kind::Sign | Kind::Axis => false,
         };
-        if small || margin < LIKELY {
+        if small(account) || margin < LIKELY {
             return None;
         }
         let (before, after) = (left(&logged.0, active), left(weighed, active));
@@ -176,7 +176,11 @@ impl Decision<'_> {
         let known = account.kind != Kind::Order
             || are_exchanged(&account.joints, &logged.0.unexplained, &weighed.unexplained, OWN);
         if margin > sure && explains && apart && notable && known {
+            // Within the border of an effect it is one, at its best size.
             let account = self.sharpened(logs, sample, active, account.clone());
+            if small(&account) {
+                return None;
+            }
             return Some(Ok(self.fault(logs, &account, before, after)));
         }
         let mut question = format!(

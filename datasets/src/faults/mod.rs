@@ -12,6 +12,7 @@ mod determined;
 mod effort;
 mod gravity;
 mod limits;
+mod merge;
 mod motion;
 mod odd;
 mod odd_effort;
@@ -73,7 +74,7 @@ pub enum FaultKind {
     EffortClipped,
     /// Joints, or one channel of them, under each other's names.
     JointOrder,
-    /// Gravity of another size or direction than the robot's.
+    /// Gravity of another direction than the robot's, of earth's size where the description has another, or none.
     Gravity,
 }
 

@@ -8,10 +8,13 @@ use crate::check::fit;
 use crate::episode::Channel;
 use gapscope_dynamics::{JointKind, Model};
 use glam::DVec3;
+use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
 /// An unexplained share below this counts as this.
 const FLOOR: f64 = 4e-3;
+/// What an effort that is counted the other way round counts.
+const TURNED: f64 = 0.5;
 /// What positions beyond the URDF's limits count, a joint, in the unit of [`look`].
 const BEYOND: f64 = 0.7;
 /// Positions that pass the limits by more spans than this cannot be.
@@ -22,7 +25,7 @@ const AGAINST_VELOCITY: f64 = 2.0;
 /// The motor's side of a gear, or counts, make positions this many times larger at least; what is smaller has a unit with a name.
 const LEAST_GEAR: f64 = 4.0;
 /// A velocity off by more than this, as a logarithm, may be that of another clock.
-const OTHER_CLOCK: f64 = 0.2;
+pub(crate) const OTHER_CLOCK: f64 = 0.2;
 /// A clock and a velocity agree where they differ by less than this, as a logarithm.
 const AGREES: f64 = 0.1;
 
@@ -96,9 +99,7 @@ impl Scene<'_> {
     /// How little of the effort a sample leaves unexplained, whatever the gain of each joint.
     pub fn look(&self, model: &Model, sample: &Sample, range: &[(f64, f64)]) -> f64 {
         let torque = sample.torque(model);
-        let left = |j: usize| {
-            fit(&sample.effort[j], &torque[j], &sample.v[j], None).map_or(1.0, |fit| fit.unexplained).max(FLOOR).ln()
-        };
+        let left = |j: usize| first_look(&sample.effort[j], &torque[j], &sample.v[j]);
         (0..model.dof()).map(|j| if self.active[j] { left(j) } else { 0.0 } + BEYOND * beyond(model, j, range[j])).sum()
     }
 
@@ -290,6 +291,38 @@ impl Scene<'_> {
         let mut all: Vec<f64> = (0..self.model.dof()).filter(|&j| self.active[j]).map(far).collect();
         crate::robust::median(&mut all).unwrap_or(0.0)
     }
+}
+
+/// How little of an effort a torque of any gain leaves beside a bias and friction that takes energy: the logarithm of its share,
+/// squared, and more where the gain is negative.
+fn first_look(effort: &[f64], torque: &[f64], speed: &[f64]) -> f64 {
+    let slow = 0.1 * crate::robust::rms(speed);
+    let dry: Vec<f64> = speed.iter().map(|v| if slow > 0.0 { (v / slow).tanh() } else { 0.0 }).collect();
+    let without_mean = |x: &[f64]| {
+        let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+        x.iter().map(|x| x - mean).collect::<Vec<f64>>()
+    };
+    let rows = [&dry[..], speed, torque, effort].map(without_mean);
+    let dot = |a: usize, b: usize| rows[a].iter().zip(&rows[b]).map(|(a, b)| a * b).sum::<f64>();
+    let all = dot(3, 3);
+    let raised = torque.iter().map(|x| x * x).sum::<f64>();
+    if !(all > 0.0 && all.is_finite() && dot(2, 2) > 1e-6 * raised && raised.is_finite()) {
+        return 0.0;
+    }
+    // Friction goes with the torque's gain or is none: every choice of its parts, the best that keeps to that.
+    let choices: [&[usize]; 4] = [&[0, 1, 2], &[0, 2], &[1, 2], &[2]];
+    let left = |columns: &&[usize]| {
+        let normal = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
+            dot(columns[a], columns[b]) * if a == b { 1.0 + 1e-9 } else { 1.0 }
+        });
+        let right = DVector::from_fn(columns.len(), |a, _| dot(columns[a], 3));
+        let found = normal.cholesky()?.solve(&right);
+        let gain = found[columns.len() - 1];
+        let takes = found.iter().all(|x| x * gain >= 0.0);
+        let turned = if gain < 0.0 { TURNED } else { 0.0 };
+        takes.then(|| ((all - found.dot(&right)).max(0.0) / all).max(FLOOR).ln() + turned)
+    };
+    choices.iter().filter_map(left).fold(0.0, f64::min)
 }
 
 /// Applies what concerns a sample.

@@ -2,10 +2,11 @@
 
 use super::change::Change;
 use super::clipped::lies_at_its_ends;
+use super::decide::SURE;
 use super::effort::{GAINS, effort_unit};
 use super::odd::MOST_LOGS;
 use super::sample::Sample;
-use super::weigh::{Freedom, spread, weigh};
+use super::weigh::{Freedom, independent, spread, weigh};
 use super::{Fault, FaultKind, figure};
 use crate::check::Logs;
 use gapscope_dynamics::Model;
@@ -17,12 +18,13 @@ const ALIKE: f64 = 0.9;
 const FAR: (f64, f64) = (0.5, 2.0);
 /// The effort of another log is right from this correlation with the prediction on.
 const GOES: f64 = 0.4;
-/// Beside an effort that clearly lost its sign, one is told by this correlation with the size, and by so much more than with
-/// the prediction.
+/// Beside an effort that clearly lost its sign, one is told by this correlation with the size, and by so many nats.
 const BESIDE: f64 = 0.5;
-const BESIDE_MORE: f64 = 0.2;
+const BESIDE_SURE: f64 = 6.0;
 /// Scales of joints of one log that differ by less than this, as a logarithm, are one.
 const ALIKE_SCALES: f64 = 0.2;
+/// An unexplained share below this counts as this.
+const FLOOR: f64 = 1e-3;
 /// Fewer places tell nothing.
 const FEWEST: usize = 30;
 
@@ -35,10 +37,15 @@ struct Beside {
     correlation: f64,
     /// The same with the size of what they predict, where the effort keeps its sign and they do not.
     folded: f64,
+    /// By how many nats the size of the prediction is likelier than the prediction itself, each at its best gain and bias.
+    lost_sign: f64,
 }
 
 /// Joints of one log each whose effort has another scale, another sign or none, where the other logs have the right one.
-pub(crate) fn odd_efforts(logs: &Logs, model: &Model, sample: &Sample, active: &[bool]) -> Vec<Fault> {
+///
+/// `alone` asks that all other joints of that log are like those of the other logs: where they are not, something else is wrong
+/// with the log, a clock for one, and looks like a scale in some of its joints.
+pub(crate) fn odd_efforts(logs: &Logs, model: &Model, sample: &Sample, active: &[bool], alone: bool) -> Vec<Fault> {
     let count = logs.episodes.len();
     let in_log = |e: usize| sample.log.iter().filter(|log| **log == e).count();
     if !(2..=MOST_LOGS).contains(&count) || (0..count).any(|e| in_log(e) < FEWEST) || !active.contains(&true) {
@@ -65,11 +72,17 @@ pub(crate) fn odd_efforts(logs: &Logs, model: &Model, sample: &Sample, active: &
         let folded = odd.iter().any(|(_, kind, _)| *kind == FaultKind::EffortAbsolute);
         // What takes the sign off one joint's effort may do so with all: beside a clear one, less is enough.
         let beside = (0..active.len()).filter(|j| folded && odd.iter().all(|(odd, ..)| odd != j)).filter_map(|j| {
-            let one =
-                table[e][j].filter(|one| one.folded > BESIDE && one.folded > one.correlation.abs() + BESIDE_MORE)?;
+            let one = table[e][j].filter(|one| one.folded > BESIDE && one.lost_sign > BESIDE_SURE)?;
             Some((j, FaultKind::EffortAbsolute, one))
         });
         let all: Vec<_> = odd.iter().copied().chain(beside).collect();
+        let off = |j: &usize| {
+            let in_others = || (0..count).filter(|o| *o != e).all(|o| others[o][*j].is_some_and(goes));
+            all.iter().all(|(odd, ..)| odd != j) && table[e][*j].is_some_and(|one| !goes(one)) && in_others()
+        };
+        if alone && (0..active.len()).any(|j| off(&j)) {
+            continue;
+        }
         // Scales that are nearly alike are one: that which has a name, or that of which the others tell best.
         let scaled = || all.iter().filter(|(_, kind, _)| *kind == FaultKind::EffortScale).map(|(_, _, one)| *one);
         let named = scaled().find(|one| effort_unit(one.gain, 0.0, None).is_some());
@@ -116,25 +129,27 @@ fn beside(effort: &[f64], predicted: &[f64]) -> Option<Beside> {
     let (below, above) = predicted.iter().fold((0.0_f64, 0.0_f64), |(l, h), x| (l.min(*x), h.max(*x)));
     // It keeps its sign, and the prediction goes a good part of its way to the other side.
     let keeps = low > -0.05 * most && below < -0.2 * above.max(-below) && above > 0.2 * above.max(-below);
-    Some(Beside {
-        gain: with(effort, predicted) / taken,
-        correlation: with(effort, predicted) / (total * taken).sqrt(),
-        folded: if keeps { with(effort, &size) / (total * spread(&size).max(1e-300)).sqrt() } else { 0.0 },
-    })
+    let correlation = with(effort, predicted) / (total * taken).sqrt();
+    let folded = if keeps { with(effort, &size) / (total * spread(&size).max(1e-300)).sqrt() } else { 0.0 };
+    let left = |correlation: f64| (1.0 - correlation * correlation).max(FLOOR);
+    let lost_sign = 0.5 * independent(effort.len()) * (left(correlation) / left(folded)).ln();
+    Some(Beside { gain: with(effort, predicted) / taken, correlation, folded, lost_sign })
 }
 
 /// Whether the effort of another log is right, where one is odd: it goes with the prediction, at a gain far from the odd one's.
 fn is_right(other: Beside, odd: Beside) -> bool {
     let apart = odd.gain < 0.0 || (odd.gain / other.gain).ln().abs() > FAR.1.ln();
-    other.correlation > GOES
-        && other.folded == 0.0
-        && (FAR.0..FAR.1).contains(&other.gain)
-        && (apart || odd.folded > 0.0)
+    goes(other) && (apart || odd.folded > 0.0)
+}
+
+/// Whether an effort goes with the prediction, at about its size.
+fn goes(one: Beside) -> bool {
+    one.correlation > GOES && one.folded == 0.0 && (FAR.0..FAR.1).contains(&one.gain)
 }
 
 /// What is wrong with an effort whose other logs are right.
 fn wrong(one: Beside) -> Option<FaultKind> {
-    if one.folded > ALIKE && one.folded > one.correlation.abs() + 0.1 {
+    if one.folded > ALIKE && one.lost_sign > SURE {
         Some(FaultKind::EffortAbsolute)
     } else if one.correlation.abs() < ALIKE || (FAR.0..FAR.1).contains(&one.gain) {
         None

@@ -3,6 +3,7 @@
 use super::change::Change;
 use super::decide::{Decision, SURE, left};
 use super::effort::{self, Useless};
+use super::merge::{composed, merge};
 use super::sample::Sample;
 use super::shift::{Bar, Clocks};
 use super::units::CLOCKS;
@@ -44,15 +45,16 @@ pub(crate) fn search(model: &Model, episodes: &[&Episode]) -> Faults {
     search.slow_logs();
     search.channels();
     search.shift_of_one();
-    search.odd_efforts();
+    search.odd_efforts(true);
     let (sample, active) = search.sampled();
     for odd in odd::odd_ones(model, &sample, &active) {
         if let Some(found) = search.apart(odd, &sample, &active) {
             return found;
         }
     }
+    search.odd_efforts(false);
     search.dynamics();
-    Faults { faults: search.faults, doubts: search.doubts }
+    Faults { faults: composed(search.faults), doubts: search.doubts }
 }
 
 impl Search {
@@ -82,7 +84,12 @@ impl Search {
         }
         self.stranger();
         let velocities = self.with_logs(channels::velocities);
-        velocities.into_iter().for_each(|fault| self.take(fault));
+        // What may be wrong with all of the logs, a clock for one, may be what seems wrong with their velocities.
+        if self.doubts.iter().any(|doubt| doubt.joints.is_empty()) {
+            self.doubts.extend(velocities.into_iter().map(Fault::asked));
+        } else {
+            velocities.into_iter().for_each(|fault| self.take(fault));
+        }
     }
 
     /// What is wrong with one log and what with the others, where that makes it one of them.
@@ -352,10 +359,10 @@ impl Search {
     }
 
     /// Efforts of one log of several that are not like those of the others.
-    fn odd_efforts(&mut self) {
+    fn odd_efforts(&mut self, alone: bool) {
         let found = self.with_logs(|logs| {
             let (active, sample) = (Self::active(logs), Sample::new(logs));
-            odd_effort::odd_efforts(logs, logs.model, &sample, &active)
+            odd_effort::odd_efforts(logs, logs.model, &sample, &active, alone)
         });
         found.into_iter().for_each(|fault| self.take(fault));
     }
@@ -381,24 +388,4 @@ fn is_unit_of_time(fault: &Fault) -> bool {
 /// A sample of logs.
 fn sampled(model: &Model, episodes: &[Episode]) -> Sample {
     Sample::new(&Logs::new(model, &episodes.iter().collect::<Vec<_>>()))
-}
-
-/// Faults that are the same but for the log become one, said of all where it is of all.
-fn merge(found: &mut Vec<Fault>, logs: usize) {
-    let mut merged: Vec<Fault> = Vec::new();
-    for fault in found.drain(..) {
-        let same = |other: &&mut Fault| {
-            other.kind == fault.kind && other.joints == fault.joints && other.changes == fault.changes
-        };
-        match merged.iter_mut().find(same) {
-            Some(other) => {
-                other.files.extend(fault.files);
-                if other.files.len() >= logs {
-                    other.files.clear();
-                }
-            }
-            None => merged.push(fault),
-        }
-    }
-    *found = merged;
 }

@@ -2,7 +2,7 @@
 
 use super::change::Change;
 use super::decide::Decision;
-use super::motion::{self, Account, Kind};
+use super::motion::{self, Account, Kind, OTHER_CLOCK};
 use super::sample::Sample;
 use super::weigh::{Freedom, weigh};
 use crate::check::Logs;
@@ -15,8 +15,14 @@ use std::f64::consts::FRAC_PI_2;
 const NAMED: f64 = 12.0;
 /// And further nats for each joint: a sixth more of its effort, squared, where no account leaves nothing.
 const PER_JOINT: f64 = 9.0;
-/// A factor is near a unit with a name where it differs by less than this, as a logarithm.
+/// A factor is near a unit with a name where it differs by less than this, as a logarithm, ...
 const NEAR: f64 = 0.05;
+/// ... and may be that unit within this: bodies that are all off by a tenth move a factor by as much.
+const WITHIN: f64 = 0.1;
+/// By how many nats degrees are likelier than any other unit before a log is looked at: they are met a hundred times as often.
+const MET: f64 = 5.0;
+/// By how many nats gravity in the opposite direction may fit worse than what lies beside it.
+const OPPOSITE: f64 = 4.0;
 /// A unit with a name that limits ask for is that unit within a factor of two.
 const UNTOLD: f64 = std::f64::consts::LN_2;
 
@@ -35,11 +41,18 @@ impl Decision<'_> {
                 let (weighed, extra) = self.weighed(&self.model.clone().with_gravity(gravity), sample, active);
                 (weighed.score - extra, gravity)
             };
-            // The earth's gravity in another direction, the opposite one first, before another gravity.
-            let turned = at(gravity.normalize() * own.length());
-            let around = [at(gravity), turned, at(-own)];
-            let most = around.iter().map(|(score, _)| *score).fold(f64::NEG_INFINITY, f64::max);
-            let found = around.into_iter().rev().find(|(score, _)| *score > most - 4.0).map_or(gravity, |(_, g)| g);
+            let mut best = at(gravity);
+            let (size, mut step) = (gravity.length(), 0.04);
+            while size > 0.0 && step > 0.004 {
+                let [x, y] = (best.1 / size).any_orthonormal_pair().into();
+                let around = [x, -x, y, -y].map(|side| at((best.1 + step * size * side).normalize() * size));
+                match around.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                    Some(better) if better.0 > best.0 + 1e-6 => best = better,
+                    _ => step *= 0.4,
+                }
+            }
+            // The opposite direction is the one that is met.
+            let found = if at(-own).0 > best.0 - OPPOSITE { -own } else { best.1 };
             return Account { gravity: Some(found), value: found.length() / own.length(), ..account };
         }
         let add = match account.kind {
@@ -60,7 +73,7 @@ impl Decision<'_> {
             let mut changed = sample.clone();
             other.changes.iter().for_each(|change| motion::apply(change, &mut changed));
             let (weighed, extra) = self.weighed(self.model, &changed, active);
-            (weighed.score - extra, other)
+            (weighed.score - extra, other, weighed.leaves_little(active))
         };
         let mut best = at(account.value);
         if account.inside > 0 {
@@ -103,28 +116,33 @@ impl Decision<'_> {
             Kind::Clock => 0.15,
             // Limits tell that there is a unit, friction and rotors hardly which.
             _ if account.inside > 0 => UNTOLD,
-            _ => NEAR,
+            _ => WITHIN,
         };
         let most = NAMED + PER_JOINT * active.iter().filter(|active| **active).count() as f64;
         let off = |value: f64| if add { (value - best.1.value).abs() } else { (value / best.1.value).ln().abs() };
         let named = near.into_iter().filter(|value| *value != 0.0 && off(*value) < reach).map(&at);
         // Degrees are the unit that is met.
-        let met = |(score, account): &(f64, Account)| {
-            score + if account.kind == Kind::Scale && account.value == 1f64.to_degrees() { NAMED } else { 0.0 }
+        let met = |(score, account, _): &(f64, Account, bool)| {
+            score + if account.kind == Kind::Scale && account.value == 1f64.to_degrees() { MET } else { 0.0 }
         };
-        // Far from where the fit has it, a unit that limits ask for is one only where the fit hardly tells.
-        let close = if account.inside > 0 { NEAR } else { reach };
-        let least = |value: f64| best.0 - if off(value) < close { most } else { NAMED };
-        let named = named.filter(|(score, account)| *score > least(account.value));
+        // Further from where the fit has it, a unit is one only where the fit hardly tells.
+        let close = if account.kind == Kind::Scale { NEAR } else { reach };
+        // No body that is off moves a zero.
+        let least = |value: f64| best.0 - if off(value) < close && !add { most } else { NAMED };
+        // Where next to nothing is left, what is left is the robot's own.
+        let named = named.filter(|(score, account, little)| {
+            *score > least(account.value) || *little && !add && off(account.value) < close
+        });
         if let Some(named) = named.max_by(|a, b| met(a).total_cmp(&met(b))) {
             return named.1;
         }
-        let measured = match account.kind {
-            Kind::Clock => motion::velocity_slope(logs),
-            Kind::Scale => slope_of(logs, account.joints[0]).map(f64::recip),
-            _ => None,
+        let (measured, near) = match account.kind {
+            // Velocities that are all off by one factor tell the clock, whatever bodies make of it.
+            Kind::Clock => (motion::velocity_slope(logs).filter(|slope| slope.ln().abs() > OTHER_CLOCK), UNTOLD),
+            Kind::Scale => (slope_of(logs, account.joints[0]).map(f64::recip), reach),
+            _ => (None, reach),
         };
-        measured.filter(|value| *value > 0.0 && off(*value) < reach).map_or(best.1, |value| at(value).1)
+        measured.filter(|value| *value > 0.0 && off(*value) < near).map_or(best.1, |value| at(value).1)
     }
 }
 

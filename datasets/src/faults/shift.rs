@@ -3,10 +3,11 @@
 use super::change::Change;
 use super::odd::MOST_LOGS;
 use super::sample::Sample;
-use super::weigh::{Freedom, Weighed, spread, weigh};
+use super::weigh::{Freedom, Weighed, independent, spread, weigh};
 use super::{Doubt, Fault, FaultKind, figure};
 use crate::check::{Logs, fit};
 use gapscope_dynamics::Model;
+use rayon::prelude::*;
 
 /// Longest shift that is looked for, s.
 const LONGEST: f64 = 0.5;
@@ -31,11 +32,12 @@ const TOGETHER: (f64, f64, f64) = (0.25, 0.3, 0.003);
 const ASKED: f64 = 2.0;
 /// The first look tells a shift where all joints together leave less by this, nats.
 const TOLD: f64 = 0.7;
-/// A log gains by a shift where it is left with so much less, nats. One log is late by itself where no other gains by its
-/// shift, ...
+/// A log gains by a shift where it is left with so much less, nats.
 const OTHERS: f64 = 0.2;
-/// ... and where it is left with this part of what it left at most: what looks like a shift in one log does in all.
+/// One log is late by itself where its shift leaves this part of what it left at most.
 const ONE: f64 = 0.45;
+/// A log tells no shift shorter than so many of its steps: whether an effort is a reading or holds until the next is not known.
+const STEPS_TOLD: f64 = 1.5;
 
 /// What is asked of a shift.
 #[derive(Debug, Clone, Copy)]
@@ -65,7 +67,8 @@ impl Clocks<'_> {
             return None;
         }
         let (best, _) = self.first(self.sample, bar)?;
-        let best = self.refined(best, bar, |_| true)?;
+        let slowest = self.logs.dt.iter().copied().fold(0.0, f64::max);
+        let best = self.refined(best, bar, |_| true).filter(|best| best.abs() >= STEPS_TOLD * slowest)?;
         let after = self.weighed(&self.moved(|_| best), Freedom::ORDINARY);
         let (part, most, least_left) = TOGETHER;
         let (left, now) = (self.share(&before), self.share(&after));
@@ -85,27 +88,74 @@ impl Clocks<'_> {
     }
 
     /// A shift of one log of several, where the others have none like it.
+    ///
+    /// Three accounts of the same logs compete: none is late, this one is, all others are by as much. Beside the robot that the
+    /// others make, a log tells its shift; the likelihood of all logs decides.
     pub fn shift_of_one(&self, bar: Bar) -> Option<Fault> {
         let count = self.logs.episodes.len();
         if !(2..=MOST_LOGS).contains(&count) {
             return None;
         }
-        let parts: Vec<Sample> = (0..count).map(|e| self.sample.within(e)).collect();
-        let enough = |e: &usize| parts[*e].len() >= FEWEST;
-        let told = |e: usize| self.first(&parts[e], bar).map(|(best, gained)| (e, best, gained));
-        let (odd, best, _) = (0..count).filter(enough).filter_map(told).max_by(|a, b| a.2.total_cmp(&b.2))?;
-        let others = (0..count).filter(|e| *e != odd).filter(enough);
-        if others.clone().next().is_none() || others.into_iter().any(|e| self.gained(&parts[e], best) > OTHERS) {
+        let told: Vec<(usize, f64)> =
+            (0..count).into_par_iter().filter_map(|e| self.told_by_others(e, bar).map(|best| (e, best))).collect();
+        if told.is_empty() {
             return None;
         }
-        let best = self.refined(best, bar, |e| e == odd)?;
-        let late = |e: usize| if e == odd { best } else { 0.0 };
-        let [before, after] = [self.sample.clone(), self.moved(late)].map(|all| self.weighed(&all, Freedom::ORDINARY));
+        // A late log bends the robot that the others are held against, and makes them look late themselves: all are tried.
+        let account = |(odd, best): (usize, f64)| {
+            let best = self.refined(best, bar, |e| e == odd)?;
+            let moved = self.moved(|e| if e == odd { best } else { 0.0 });
+            Some((odd, best, self.weighed(&moved, Freedom::ORDINARY), moved))
+        };
+        let accounts = told.into_iter().filter_map(account);
+        let (odd, best, after, moved) = accounts.max_by(|a, b| a.2.score.total_cmp(&b.2.score))?;
+        let logged = self.weighed(self.sample, Freedom::ORDINARY);
+        // What looks like a shift and is an effect does so in all logs.
+        let [others, alike] = [self.sample.without(odd), self.moved(|_| best).without(odd)];
+        let others_too = self.weighed(&alike, Freedom::ORDINARY).score > self.weighed(&others, Freedom::ORDINARY).score;
         // What the robot that all logs make leaves of this one.
-        let left = |of: &Weighed, effort: &[Vec<f64>]| self.left_in(of, effort, odd);
-        let (left, now) = (left(&before, &self.sample.effort), left(&after, &self.moved(late).effort));
-        let sure = after.score - before.score > bar.sure && now < ONE * left;
+        let (left, now) = (self.left_in(&logged, &self.sample.effort, odd), self.left_in(&after, &moved.effort, odd));
+        let sure = after.score - logged.score > bar.sure && !others_too && now < ONE * left;
         sure.then(|| self.fault(best, &[odd], (left, now)))
+    }
+
+    /// The shift at which one log's efforts are the likeliest, beside what the robot that the other logs make predicts of them;
+    /// `None` where it is an effect's, or hardly likelier than none.
+    fn told_by_others(&self, log: usize, bar: Bar) -> Option<f64> {
+        let within = self.sample.within(log);
+        if within.len() < FEWEST || self.sample.len() - within.len() < FEWEST {
+            return None;
+        }
+        let others = Sample { silent: Some(log), ..self.sample.clone() };
+        let predicted = self.weighed(&others, Freedom::WORN).predicted;
+        let at: Vec<usize> = (0..self.sample.len()).filter(|&k| self.sample.log[k] == log).collect();
+        let likelihood = |later: f64| {
+            let effort = within.effort_after(self.logs, |_| later);
+            let left = |j: usize| {
+                let off: Vec<f64> = at.iter().zip(&effort[j]).map(|(&k, effort)| effort - predicted[j][k]).collect();
+                (spread(&off) / spread(&effort[j]).max(1e-300)).max(FLOOR).ln()
+            };
+            -0.5 * independent(within.len()) * self.group().map(left).sum::<f64>()
+        };
+        let (best, most) = self.likeliest(bar, likelihood);
+        let least = bar.least.max(STEPS_TOLD * self.logs.dt[log]);
+        let long = best.abs() >= least && best.abs() <= 0.97 * self.range(bar).0;
+        (long && most - likelihood(0.0) > bar.sure).then_some(best)
+    }
+
+    /// The shift of the greatest likelihood, s, and that.
+    fn likeliest(&self, bar: Bar, likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
+        let (longest, step) = self.range(bar);
+        let steps = (longest / step) as i32;
+        let table = (-steps..=steps).map(|i| f64::from(i) * step).map(|later| (later, likelihood(later)));
+        let mut best = table.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
+        let mut width = 0.5 * step;
+        for _ in 0..7 {
+            let around = [best.0 - width, best.0 + width].map(|later| (later, likelihood(later)));
+            best = around.into_iter().fold(best, |best, other| if other.1 > best.1 { other } else { best });
+            width *= 0.5;
+        }
+        best
     }
 
     /// Whether several logs by themselves tell this shift, and all gain by it.
@@ -154,23 +204,10 @@ impl Clocks<'_> {
     /// The shift that a first look tells, and what it gains.
     fn first(&self, sample: &Sample, bar: Bar) -> Option<(f64, f64)> {
         let torque = sample.torque(self.model);
-        let (longest, step) = self.range(bar);
-        let steps = (longest / step) as i32;
         let left_at = |later: f64| self.left_at(sample, &torque, later);
-        let table = (-steps..=steps).map(|i| f64::from(i) * step).map(|later| (left_at(later), later));
-        let (mut lowest, mut best) = table.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let mut width = 0.5 * step;
-        for _ in 0..7 {
-            for other in [best - width, best + width] {
-                let now = left_at(other);
-                if now < lowest {
-                    (best, lowest) = (other, now);
-                }
-            }
-            width *= 0.5;
-        }
-        let gained = left_at(0.0) - lowest;
-        (best.abs() >= bar.least && gained >= TOLD && best.abs() <= 0.97 * longest).then_some((best, gained))
+        let (best, most) = self.likeliest(bar, |later| -left_at(later));
+        let gained = left_at(0.0) + most;
+        (best.abs() >= bar.least && gained >= TOLD && best.abs() <= 0.97 * self.range(bar).0).then_some((best, gained))
     }
 
     /// The shift of some logs at its greatest likelihood. The first look lets friction be anything, which moves a shift; a robot's

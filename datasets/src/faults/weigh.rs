@@ -16,6 +16,8 @@ const WORN: f64 = 3.0;
 const GRAMS: f64 = 1e-3;
 /// ... within this, as a logarithm.
 const NEAR: f64 = 0.7;
+/// What is left of an effort, squared, is little below this.
+const LITTLE: f64 = 0.03;
 /// Rounds of weighing the joints against each other.
 const ROUNDS: usize = 4;
 /// Columns of each joint: bias, viscous and dry friction, rotor, gain.
@@ -72,8 +74,12 @@ impl Weighed {
     /// Whether nothing is left to ask: little of any effort, and of an ordinary robot.
     pub fn is_plain(&self, active: &[bool]) -> bool {
         let joints = active.iter().filter(|active| **active).count() as f64;
-        let little = self.unexplained.iter().zip(active).all(|(left, active)| !active || *left < 0.03);
-        little && self.asked < 4.0 + 2.0 * joints
+        self.leaves_little(active) && self.asked < 4.0 + 2.0 * joints
+    }
+
+    /// Whether little of any effort is left.
+    pub fn leaves_little(&self, active: &[bool]) -> bool {
+        self.unexplained.iter().zip(active).all(|(left, active)| !active || *left < LITTLE)
     }
 }
 
@@ -137,7 +143,7 @@ pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[boo
     let mut prior = prior(model, sample, &level, freedom);
     let ordinary = prior.clone();
     let variance: Vec<f64> = target.iter().map(|y| spread(&heard.iter().map(|&k| y[k]).collect::<Vec<_>>())).collect();
-    let independent = (0.5 * places as f64).min(MOST_INDEPENDENT);
+    let independent = independent(places);
     // Rows count as fewer where they are not independent.
     let worth = independent / places.max(1) as f64;
     let mut noise: Vec<f64> = variance.iter().map(|v| (0.1 * v).max(1e-300)).collect();
@@ -272,6 +278,11 @@ fn prior(model: &Model, sample: &Sample, level: &[f64], freedom: Freedom) -> Vec
         ]);
     }
     prior
+}
+
+/// Places count as so many independent ones: neighbours share half of their tents.
+pub(crate) fn independent(places: usize) -> f64 {
+    (0.5 * places as f64).min(MOST_INDEPENDENT)
 }
 
 /// Variance.

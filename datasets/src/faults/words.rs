@@ -34,13 +34,7 @@ pub(crate) fn phrase(logs: &Logs, account: &Account) -> String {
         Kind::Zero => {
             format!("the zero of {joints} is at {} {} of the log", figure(account.value), logs.unit(account.joints[0]))
         }
-        Kind::Clock => {
-            let unit = motion::CLOCKS.iter().find(|(_, factor)| (factor / account.value).ln().abs() < 0.15);
-            match unit {
-                Some((name, _)) => format!("time is in {name}"),
-                None => format!("the clock runs {} times as fast as it should", figure(account.value)),
-            }
-        }
+        Kind::Clock => clock_words(account.value),
         Kind::Gravity => {
             let gravity = account.gravity.unwrap_or_default();
             format!(
@@ -70,6 +64,15 @@ pub(crate) fn phrase(logs: &Logs, account: &Account) -> String {
                 .collect();
             format!("the {what} are in another order: {}", pairs.join(", "))
         }
+    }
+}
+
+/// What a clock says that runs so many times as fast as the true one.
+pub(crate) fn clock_words(factor: f64) -> String {
+    let unit = motion::CLOCKS.iter().find(|(_, unit)| (unit / factor).ln().abs() < 0.15);
+    match unit {
+        Some((name, _)) => format!("time is in {name}"),
+        None => format!("the clock runs {} times as fast as it should", figure(factor)),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Wrong logs, as users have them: none panics, none hangs, and none gets a confident answer without a word.
 
-use crate::support::{gapscope, pendulum, said};
+use crate::support::{chain, gapscope, pendulum, said, servo_arm};
 use serde_json::Value;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -89,6 +89,72 @@ fn another_unit_is_the_answer_and_as_logged_is_no_confident_one() {
     }
 }
 
+/// Leaves the header and so many rows of `log.csv` in `short.csv`.
+fn shorten(folder: &Path, rows: usize) {
+    let text = std::fs::read_to_string(folder.join("log.csv")).unwrap();
+    let lines: Vec<&str> = text.lines().take(rows + 1).collect();
+    std::fs::write(folder.join("short.csv"), lines.join("\n") + "\n").unwrap();
+}
+
+#[test]
+fn logs_of_no_row_or_a_few_say_so_in_every_command() {
+    for dir in [pendulum(), servo_arm()] {
+        let folder = dir.path();
+        let run = |arguments: &str| {
+            let output = gapscope(folder, arguments.split(' '));
+            (output.status.code(), said(&output))
+        };
+        shorten(folder, 0);
+        for command in ["diagnose robot.urdf short.csv", "evaluate robot.urdf short.csv", "inspect short.csv"] {
+            let (code, text) = run(command);
+            assert!(code == Some(1) && text.contains("not one whole row"), "{command}: {text}");
+        }
+        for rows in 1..=3 {
+            shorten(folder, rows);
+            // Too short to tell anything is a verdict, as of a robot that stands still.
+            let (code, text) = run("diagnose robot.urdf short.csv --out found --force");
+            let json: Value =
+                serde_json::from_str(&std::fs::read_to_string(folder.join("found/diagnosis.json")).unwrap()).unwrap();
+            assert!(
+                code == Some(0) && json["verdict"] == "not_excited" && text.contains("at least 20"),
+                "{rows}: {text}"
+            );
+            for command in ["inspect short.csv", "inspect short.csv --model robot.urdf"] {
+                let (code, text) = run(command);
+                assert!(code == Some(0) && text.contains("at least 20"), "{command}, {rows}: {text}");
+            }
+            let figures_need_rows = ["evaluate robot.urdf short.csv", "rollout robot.urdf short.csv"];
+            for command in figures_need_rows {
+                let (code, text) = run(command);
+                assert!(code == Some(1) && text.contains("no log is long enough"), "{command}, {rows}: {text}");
+            }
+            let (code, text) = run("train residual robot.urdf short.csv --out net");
+            let without_effort = text.contains("no column feeds the effort");
+            assert!(code == Some(1) && (without_effort || text.contains("0 steps")), "{rows}: {text}");
+        }
+    }
+}
+
+#[test]
+fn a_robot_without_a_joint_that_moves_is_named_in_every_command() {
+    let urdf = r#"<robot name="still"><link name="base"/><link name="top"/>
+        <joint name="joint1" type="fixed"><parent link="base"/><child link="top"/></joint></robot>"#;
+    for dir in [pendulum(), servo_arm()] {
+        std::fs::write(dir.path().join("still.urdf"), urdf).unwrap();
+        for command in [
+            "diagnose still.urdf log.csv",
+            "inspect log.csv --model still.urdf",
+            "evaluate still.urdf log.csv",
+            "rollout still.urdf log.csv",
+            "train residual still.urdf log.csv",
+        ] {
+            let output = gapscope(dir.path(), command.split(' '));
+            let text = said(&output);
+            assert!(output.status.code() == Some(1) && text.contains("no joint that moves"), "{command}: {text}");
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_a_robot_or_a_log_is_named() {
     let dir = pendulum();
@@ -139,4 +205,74 @@ fn inspect_tells_rate_and_motion_with_and_without_a_robot() {
     assert!(told.iter().any(|parameter| parameter == "viscous_friction"), "{held}");
     let text = said(&gapscope(dir.path(), "inspect log.csv --model robot.urdf".split(' ')));
     assert!(text.contains("200 Hz") && text.contains("Determined"), "{text}");
+}
+
+#[test]
+fn a_wrong_unit_takes_no_ten_times_as_long_as_its_healthy_twin() {
+    let timed = |wrong: &dyn Fn(&str, f64) -> f64| {
+        let dir = pendulum();
+        spoil(dir.path(), |name, _, x| wrong(name, x));
+        let start = Instant::now();
+        diagnosed(dir.path(), "");
+        start.elapsed()
+    };
+    let healthy = timed(&|_, x| x);
+    let held = |name: &str, took: Duration| {
+        assert!(took < 10 * healthy.max(Duration::from_secs(1)), "{name}: {took:?}, healthy {healthy:?}");
+    };
+    held("ms", timed(&|name, x| if name == "time" { 1e3 * x } else { x }));
+    held("degrees", timed(&|name, x| if is(name, "position") { x.to_degrees() } else { x }));
+    held("opposite effort", timed(&|name, x| if is(name, "effort") { -x } else { x }));
+}
+
+/// What lies in a folder.
+#[cfg(unix)]
+fn names(folder: &Path) -> std::collections::BTreeSet<std::ffi::OsString> {
+    std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect()
+}
+
+#[test]
+#[cfg(unix)]
+fn a_full_disk_is_an_error_and_leaves_nothing() {
+    let dir = pendulum();
+    let before = names(dir.path());
+    // No file may grow beyond some kilobytes. Without the signal that comes with it, a write fails as on a full disk.
+    let run = |arguments: &str| {
+        let shell = ["-c", "trap '' XFSZ; ulimit -f 20; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_gapscope")];
+        std::process::Command::new("sh")
+            .args(shell)
+            .args(arguments.split(' '))
+            .current_dir(dir.path())
+            .output()
+            .unwrap()
+    };
+    for arguments in ["diagnose robot.urdf log.csv --out found", "generate arm7 --perturb --out made"] {
+        let output = run(arguments);
+        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        assert!(said(&output).contains("cannot write"), "{}", said(&output));
+        assert_eq!(names(dir.path()), before, "{arguments}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_ends_it_within_a_second_and_leaves_nothing() {
+    use std::os::unix::process::ExitStatusExt;
+    let dir = chain(12);
+    let before = names(dir.path());
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_gapscope"))
+        .args(["diagnose", "robot.urdf", "log.csv", "--out", "found"])
+        .current_dir(dir.path())
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(child.try_wait().unwrap().is_none(), "it is done before it can be interrupted");
+    let start = Instant::now();
+    assert!(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let status = child.wait().unwrap();
+    assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
+    assert_eq!(status.signal(), Some(2), "{status:?}");
+    assert_eq!(names(dir.path()), before);
 }

@@ -46,8 +46,9 @@ fn row(effect: &FoundEffect, all: &[String], shrinks: &str) -> Markup {
                 }
                 td.joints data-label="joints" title=(effect.joints.join(", ")) { (words::joints(&effect.joints, all)) }
                 td.nowrap data-label="confidence" { (meter(effect.confidence)) " " (format::probability_figure(effect.confidence)) "\u{202f}%" }
-                td.number data-label=(shrinks) {
-                    @let grows = effect.shrink.torque.is_some_and(|part| part < 0.0);
+                @let grows = effect.shrink.torque.is_some_and(|part| part < 0.0);
+                // On a card the label stands before the figure, which then says that it grows.
+                td.number data-label=(if grows { shrinks.trim_end_matches(" shrinks by") } else { shrinks }) {
                     @if grows { "grows by " }
                     (effect.shrink.torque.map_or(unknown.into(), |part| percent_within(part.abs(), effect.shrink.ci95)))
                     @if let Some([low, high]) = effect.shrink.ci95 {

@@ -23,7 +23,7 @@ JSON = re.compile(r"`(\w+\.json)`[^\n]*\n\n```json\n(.*?)```", re.S)
 DEMO = re.compile(r"(?<=```\n)A 7-joint arm moves.*?(?=```)", re.S)
 HERE = pathlib.Path(__file__).resolve().parent
 # In the order in which one needs what another wrote.
-PAGES = ["tutorial", "answer", "export", "rollouts", "good-logs", "servo-arms"]
+PAGES = ["tutorial", "answer", "export", "rollouts", "good-logs", "servo-arms", "generate", "real-robots"]
 # Folders of real logs that pages call by a shorter name.
 SHORT = {"xl330": "xl330_pendulum"}
 

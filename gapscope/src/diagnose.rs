@@ -3,14 +3,15 @@
 use crate::cli::Input;
 use crate::input::{Loaded, load_any};
 use crate::progress::Progress;
+use crate::report::effort::Effort;
 use crate::report::terminal::Paint;
 use crate::report::{Beside, Setting};
 use crate::trust::trusting;
-use crate::{output, report, servo, summary};
+use crate::{output, report, servo, stored, summary};
 use anyhow::{Context, Result};
 use clap::Args;
 use gapscope_datasets::{Bound, Trajectory};
-use gapscope_diagnosis::schema::Evidence;
+use gapscope_diagnosis::schema::{Diagnosis, Evidence};
 use gapscope_diagnosis::{NEXT_EXPERIMENT, NUMBERS, Outcome, Progress as Told, diagnose};
 use std::path::Path;
 use std::path::PathBuf;
@@ -170,7 +171,10 @@ impl Found {
 
     fn why_on(&self, paint: &Paint) -> String {
         match self {
-            Found::Torque(outcome, _) => summary::why(&outcome.diagnosis.why, &outcome.diagnosis.joints, paint),
+            Found::Torque(outcome, _) => {
+                let Diagnosis { why, joints, gap, .. } = &outcome.diagnosis;
+                Effort::of(&gap.regimes).say(&summary::why(why, joints, paint))
+            }
             Found::Servo(outcome, _) => servo::why(&outcome.diagnosis, paint),
         }
     }
@@ -195,7 +199,7 @@ pub fn sentences(text: &str) -> Result<[String; 3]> {
     if let Ok(diagnosis) = serde_json::from_str(text) {
         return Ok(servo::sentences(&diagnosis));
     }
-    let diagnosis = serde_json::from_str(text).context("this is not a diagnosis.json that gapscope wrote")?;
+    let diagnosis = stored::diagnosis(text).context("this is not a diagnosis.json that gapscope wrote")?;
     let [place, which, how_far] = report::answer_sentences(&diagnosis, &Evidence::default());
     Ok([which, place, how_far])
 }

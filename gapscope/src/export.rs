@@ -6,11 +6,10 @@ use crate::cli::{Input, Kind};
 use crate::input::Reading;
 use crate::learned::{self, Trained};
 use crate::robot::Description;
-use crate::{input, output, robot};
+use crate::{input, output, robot, stored};
 use anyhow::{Context, Result, bail, ensure};
 use gapscope_datasets::Episode;
 use gapscope_diagnosis::Corrected;
-use gapscope_diagnosis::schema::Diagnosis;
 use gapscope_dynamics::{Loaded, Model};
 use gapscope_export::{
     DT, Exported, LEDGER_SCHEMA, Ledger, Ranges, Robot, SAMPLER, Target, TargetLedger, export, fmu,
@@ -136,7 +135,7 @@ fn ranges(corrected: &std::path::Path) -> Result<Ranges> {
     let text = std::fs::read_to_string(&file).with_context(|| {
         format!("cannot read {name}, which has the standard errors; give the folder that `gapscope diagnose` wrote")
     })?;
-    let diagnosis: Diagnosis = serde_json::from_str(&text).with_context(|| {
+    let diagnosis = stored::diagnosis(&text).with_context(|| {
         format!("{name} is no diagnosis of logs with torque, whose parameters have standard errors")
     })?;
     Ranges::new(&diagnosis).with_context(|| {

@@ -1,7 +1,7 @@
 //! `gapscope report`: one page over all diagnoses below a folder.
 
-use crate::output;
 use crate::report::{Entry, Found, index_page};
+use crate::{output, stored};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -96,7 +96,7 @@ fn relative(folder: &Path, page: &Path, searched: &Path) -> String {
 
 fn read(file: &Path) -> Result<Found> {
     let text = std::fs::read_to_string(file)?;
-    match serde_json::from_str::<gapscope_diagnosis::schema::Diagnosis>(&text) {
+    match stored::diagnosis(&text) {
         Ok(diagnosis) => Ok(Found::from(&diagnosis)),
         // A servo arm's has other figures; what is neither is told as the one that is commoner.
         Err(error) => match serde_json::from_str::<gapscope_servo::schema::Diagnosis>(&text) {

@@ -122,8 +122,11 @@ pub fn warn(notes: &[String]) {
 pub fn fault_line(fault: &Fault) -> String {
     let files = if fault.files.is_empty() { String::new() } else { format!("{}: ", fault.files.join(", ")) };
     let named = fault.joints.iter().any(|joint| fault.evidence.contains(joint.as_str()));
-    let joints =
-        if fault.joints.is_empty() || named { String::new() } else { format!("{}: ", fault.joints.join(", ")) };
+    let joints = if fault.joints.is_empty() || named {
+        String::new()
+    } else {
+        format!("{}: ", shortened(&fault.joints.join(", "), &fault.joints))
+    };
     let done = match (fault.mended, fault.leaves_joints_out()) {
         (true, _) => "Mended here; to mend the log",
         (false, true) => "Left out here; the mend",
@@ -132,7 +135,17 @@ pub fn fault_line(fault: &Fault) -> String {
     // A name at the beginning stays as it is.
     let begins = files.is_empty() && joints.is_empty() && !fault.joints.iter().any(|j| fault.evidence.starts_with(j));
     let evidence = if begins { crate::report::capital(&fault.evidence) } else { fault.evidence.clone() };
-    format!("{files}{joints}{evidence}. {done}: {}", fault.mend)
+    format!("{files}{joints}{}. {done}: {}", shortened(&evidence, &fault.joints), fault.mend)
+}
+
+/// A text with a list of three joints or more told by their numbers, where names differ in these alone.
+fn shortened(text: &str, joints: &[String]) -> String {
+    let short = crate::report::joint_list(joints, joints);
+    if joints.len() > 2 && short.starts_with("joints ") {
+        text.replace(&joints.join(", "), &short)
+    } else {
+        text.to_owned()
+    }
 }
 
 /// Reads robot and logs. Joints of which the logs say nothing are held at zero, with a finding.

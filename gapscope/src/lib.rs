@@ -22,6 +22,7 @@ pub mod robot;
 pub mod rollout;
 mod servo;
 mod shell;
+mod stored;
 mod study;
 mod summary;
 pub mod train;

@@ -6,6 +6,8 @@ use crate::cli::{Diagnose, Evaluate};
 use crate::input::Loaded;
 use crate::report::{self, Beside};
 use anyhow::{Context, Result, bail};
+use gapscope_datasets::Trajectory;
+use gapscope_diagnosis::NEXT_EXPERIMENT;
 use gapscope_servo::schema::Evaluation;
 use gapscope_servo::{Given, Outcome, Paths, ServoModel};
 use std::fmt::Write;
@@ -35,7 +37,7 @@ pub fn diagnosed(args: &Diagnose, loaded: &Loaded, progress: &(dyn Fn(&str, f64)
     let name = |path: &Path| path.display().to_string();
     let logs = args.input.logs.iter().map(|log| name(log)).collect();
     let beside = Beside::of_files(loaded, name(&args.input.robot), logs, args.drive.as_deref().map(name));
-    let beside = beside.with(&loaded.model, &loaded.episodes, &outcome.evidence);
+    let beside = beside.with(&loaded.model, &loaded.episodes, &outcome);
     Ok((outcome, beside))
 }
 
@@ -49,6 +51,8 @@ pub fn files(outcome: &Outcome, beside: &Beside, out: &Path) -> Result<Vec<(&'st
         ("diagnosis.json", Some(serde_json::to_string_pretty(&outcome.diagnosis)?)),
         ("corrected.json", Some(serde_json::to_string_pretty(&outcome.corrected)?)),
         ("report.html", Some(report::servo_html(outcome, beside, &corrected))),
+        // The advice of an earlier diagnosis in this folder is out of date.
+        (NEXT_EXPERIMENT, outcome.trajectory.as_ref().map(Trajectory::to_csv)),
     ])
 }
 

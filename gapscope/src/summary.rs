@@ -5,6 +5,7 @@ mod change;
 pub mod which;
 
 use crate::input::fault_line;
+use crate::report::effort::Effort;
 use crate::report::plain;
 use crate::report::terminal::{INDENT, Paint, block, blocks, clean, column, fill, name as padded, pad, wrap};
 use crate::report::{
@@ -72,7 +73,8 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
         with_unit(&rounded(data.rate), "Hz")
     );
     lines.extend(wrap(&clean(&of), paint.width));
-    block(&mut lines, paint, "Ties", &ties(&diagnosis.effects));
+    let effort = Effort::of(&diagnosis.gap.regimes);
+    block(&mut lines, paint, "Ties", &said(effort, &ties(&diagnosis.effects)));
     let label = verdict(diagnosis.verdict).to_uppercase();
     let mended = data.faults.iter().any(|fault| fault.mended);
     let of = if mended { "Of the mended logs: " } else { "" };
@@ -81,7 +83,7 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
     lines.push(String::new());
     if diagnosis.verdict != Verdict::NotExcited {
         block(&mut lines, paint, "Which", &which::of(diagnosis, paint));
-        block(&mut lines, paint, "Where", &places(diagnosis));
+        block(&mut lines, paint, "Where", &said(effort, &places(diagnosis)));
         block(
             &mut lines,
             paint,
@@ -89,12 +91,12 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
             &how_far(&diagnosis.shrink, &diagnosis.gap.regimes, !diagnosis.effects.is_empty()),
         );
     }
-    block(&mut lines, paint, "Notes", &notes(diagnosis, paint.terminal));
+    block(&mut lines, paint, "Notes", &said(effort, &notes(diagnosis, paint.terminal)));
     if let (Verdict::NoGap, Some(line)) = (diagnosis.verdict, power_line(&diagnosis.power)) {
-        block(&mut lines, paint, "Power", &[line]);
+        block(&mut lines, paint, "Power", &[effort.say(&line)]);
     }
     if let Some(next) = &diagnosis.next_experiment {
-        block(&mut lines, paint, "Next", &[clean(&sentences(&in_words(&next.motion)))]);
+        block(&mut lines, paint, "Next", &[effort.say(&clean(&sentences(&in_words(&next.motion))))]);
     }
     let mut text = ordinary_spaces(&lines);
     if let Some(out) = out {
@@ -158,7 +160,8 @@ pub fn evaluation_summary(evaluation: &Evaluation) -> String {
             let floor =
                 torque.floor.get(*joint).map_or(String::new(), |f| format!("; noise floor {}", significant(*f, 2)));
             let rms_text = with_unit(&figure(*rms), unit);
-            format!("{}  {}  torque gap {} rms{floor}", padded(joint, width), blocks(rms / top, 10), fill(&rms_text, 9))
+            let word = Effort::of(&evaluation.gap.regimes).word();
+            format!("{}  {}  {word} gap {} rms{floor}", padded(joint, width), blocks(rms / top, 10), fill(&rms_text, 9))
         })
         .collect();
     block(&mut lines, paint, "Where", &rest(rows, joints.len(), LOGS, "joint"));
@@ -186,6 +189,11 @@ pub fn evaluation_summary(evaluation: &Evaluation) -> String {
 pub fn ordinary_spaces(lines: &[String]) -> String {
     let text: String = lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect();
     text.replace(['\u{a0}', '\u{202f}'], " ")
+}
+
+/// Lines in the robot's own word for what its drives push with.
+pub fn said(effort: Effort, lines: &[String]) -> Vec<String> {
+    lines.iter().map(|line| effort.say(line)).collect()
 }
 
 fn places(diagnosis: &Diagnosis) -> Vec<String> {
@@ -242,7 +250,7 @@ fn how_far(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Vec<String> 
     if changed(&shrink.torque) {
         let floor = percent(shrink.reference.noise_floor);
         let note = format!("   of effort std, floor {floor}");
-        cells.push(("torque".to_string(), Cells::of(&shrink.torque, percent), note));
+        cells.push((Effort::of(regimes).word().to_string(), Cells::of(&shrink.torque, percent), note));
     }
     if changed(&shrink.one_step) {
         cells.push((

@@ -7,6 +7,7 @@ use crate::choose::{Chosen, From, choose};
 use crate::claims::{confidence, drive, effects, reasons, whole_effect};
 use crate::clock::nominal_rate;
 use crate::evidence::Evidence;
+use crate::experiment::{self, next_experiment};
 use crate::fit::fit;
 use crate::gap::{self, Errors};
 use crate::given::Given;
@@ -19,8 +20,9 @@ use crate::rest;
 use crate::schema::*;
 use crate::simulate::trace;
 use crate::together::{drop_what_the_arm_does_not_miss, is_missed};
+use crate::units;
 use crate::whole::{Found, Whole, changed, look, surround};
-use gapscope_datasets::Episode;
+use gapscope_datasets::{Episode, Trajectory};
 use gapscope_dynamics::Model;
 use gapscope_effects::Effect;
 use rayon::prelude::*;
@@ -46,6 +48,8 @@ pub struct Outcome {
     pub corrected: ServoModel,
     /// What a report draws.
     pub evidence: Evidence,
+    /// The set points that the next experiment names, if it names any.
+    pub trajectory: Option<Trajectory>,
 }
 
 /// Diagnoses a servo arm from logs that may lack its torque. `findings` are those of reading.
@@ -151,7 +155,14 @@ pub fn diagnose(
             (joint.name.clone(), drive(joint, law, c.as_ref(), spread.as_ref(), episodes))
         })
         .collect();
-    let diagnosis = Diagnosis {
+    progress("what to log next", 0.9);
+    let each: Vec<experiment::Found> = all
+        .iter()
+        .zip(chosen.iter().zip(&spreads))
+        .map(|(joint, (c, s))| experiment::Found { joint, chosen: c.as_ref(), spread: s.as_ref() })
+        .collect();
+    let (next, trajectory) = next_experiment(model, &corrected, &each).unzip();
+    let mut diagnosis = Diagnosis {
         schema: "gapscope.diagnosis/1".to_owned(),
         robot: model.name().to_owned(),
         joints: all.iter().map(|joint| joint.name.clone()).collect(),
@@ -173,10 +184,12 @@ pub fn diagnose(
         unexplained: Unexplained { fraction },
         shrink: Shrink { position },
         why,
-        next_experiment: None,
+        next_experiment: next,
     };
-    let evidence = Evidence::new(&before, &after, &all);
-    Ok(Outcome { diagnosis, corrected, evidence })
+    units::of_diagnosis(model, &mut diagnosis);
+    let mut evidence = Evidence::new(&before, &after, &all);
+    units::of_regimes(model, &mut evidence.left);
+    Ok(Outcome { diagnosis, corrected, evidence, trajectory: trajectory.flatten() })
 }
 
 /// Constants that an effect of the whole arm may be behind.

@@ -6,6 +6,7 @@ use crate::given::Given;
 use crate::model::{ServoModel, ServoModelError};
 use crate::prepare::joints;
 use crate::schema::*;
+use crate::units;
 use crate::weigh::weigh;
 use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
@@ -54,7 +55,7 @@ pub fn evaluate(
         let rows = || after.iter().flat_map(|log| moving.iter().flat_map(move |&j| log[j].iter()));
         rows().map(|e| e.abs()).sum::<f64>() / rows().count().max(1) as f64
     });
-    let evaluation = Evaluation {
+    let mut evaluation = Evaluation {
         schema: "gapscope.evaluation/1".to_owned(),
         gap: Gap {
             position: PositionGap {
@@ -71,6 +72,7 @@ pub fn evaluate(
         after: after.as_ref().map(|after| gap::by_joint(after, &all)).unwrap_or_default(),
         logs,
     };
+    units::of_regimes(model, &mut evaluation.gap.regimes);
     let paths = gap::paths(changed, &all);
     Ok((evaluation, paths))
 }

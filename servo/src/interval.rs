@@ -84,6 +84,11 @@ impl Spread {
         Spread { free: fit.free.clone(), values: fit.free.iter().map(|&param| fit.law[param]).collect(), covariance }
     }
 
+    /// Covariance of the free parameters, in the order of [`Fit::free`].
+    pub fn covariance(&self) -> &DMatrix<f64> {
+        &self.covariance
+    }
+
     fn at(&self, param: Param) -> Option<usize> {
         self.free.iter().position(|free| *free == param)
     }

@@ -231,8 +231,23 @@ pub struct Diagnosis {
     pub shrink: Shrink,
     /// The comparisons that decided.
     pub why: Vec<Why>,
-    /// None yet for servo arms.
-    pub next_experiment: Option<String>,
+    /// What to log next; `None` where all numbers are known well, or no motion would tell them better.
+    pub next_experiment: Option<NextExperiment>,
+}
+
+/// What to log next, as in a diagnosis of logs with torque.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NextExperiment {
+    /// What these logs do not tell well.
+    pub why: String,
+    /// Kinds that it would tell apart.
+    pub separates: Vec<String>,
+    /// What to do.
+    pub motion: String,
+    /// File of the set points beside the diagnosis.
+    pub trajectory: Option<String>,
+    /// Standard errors between accounts; `None` where it is a number that would be known better.
+    pub separation: Option<f64>,
 }
 
 /// An evaluation.

@@ -19,7 +19,7 @@ pub struct SpeedLimit {
 
 impl SpeedLimit {
     pub(crate) const CARD: Card =
-        Card { words: "speed limit", meaning: "the drive turns no faster than this", part: Part::Servo, ..Card::BLANK };
+        Card { words: "speed limit", meaning: "the drive moves no faster than this", part: Part::Servo, ..Card::BLANK };
 
     /// Parameters under their public names.
     pub fn parameters(&self) -> Vec<Value> {

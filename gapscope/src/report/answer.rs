@@ -1,5 +1,6 @@
 //! The answer in three sentences: where, which, how far.
 
+use super::effort::Effort;
 use super::format::{
     count, estimate, numbers, percent, percent_interval, percent_within, plain, probability_figure, significant, span,
     with_interval, with_unit,
@@ -12,13 +13,14 @@ const NAMED: usize = 4;
 
 /// Where, which and how far, one sentence each.
 pub fn sentences(diagnosis: &Diagnosis, evidence: &Evidence) -> [String; 3] {
-    [place(diagnosis, evidence), which(diagnosis), how_far(diagnosis)]
+    let effort = Effort::of(&diagnosis.gap.regimes);
+    [place(diagnosis, evidence), which(diagnosis), how_far(diagnosis)].map(|line| effort.say(&line))
 }
 
 fn place(diagnosis: &Diagnosis, evidence: &Evidence) -> String {
     let torque = &diagnosis.gap.torque;
     let Some((joint, rms)) = super::plain::largest(diagnosis) else {
-        return "No torque gap could be evaluated on these logs.".into();
+        return "No gap could be evaluated on these logs.".into();
     };
     let unit = words::torque_unit(joint, evidence, &diagnosis.gap.regimes);
     let (gap, ends) = with_interval(rms, torque.ci95.get(joint).copied());
@@ -46,6 +48,7 @@ fn place(diagnosis: &Diagnosis, evidence: &Evidence) -> String {
     };
     let others = match (above_floor(diagnosis), diagnosis.joints.len()) {
         (_, 0 | 1) => String::new(),
+        (2, 2) => "; both joints lie above the noise".into(),
         (n, all) if n == all => format!("; all {all} joints lie above the noise"),
         (n, all) => format!("; {n} of {all} joints lie above the noise"),
     };

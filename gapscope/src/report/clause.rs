@@ -76,7 +76,7 @@ pub fn of(effect: &FoundEffect, all: &[String], sums: &[Combination]) -> String 
         "joint_coupling" => {
             let shared = [("coulomb", "dry friction"), ("viscous", "viscous friction"), ("armature", "rotor inertia")];
             let (name, what) = *shared.iter().find(|(name, _)| s.size(name).is_some()).unwrap_or(&shared[0]);
-            s.lacking(&s.does("turns a shared part", "turn a part together"), name, what)
+            s.lacking(&s.does("moves a shared part", "move a part together"), name, what)
         }
         "payload" => match s.size("mass") {
             Some(mass) if mass.starts_with('−') => {
@@ -105,11 +105,9 @@ pub fn of(effect: &FoundEffect, all: &[String], sums: &[Combination]) -> String 
             let limit = s.size("limit").unwrap_or("its limit".into());
             format!("{} no more than {limit}, whatever is commanded", s.does("delivers", "deliver"))
         }
-        "torque_ripple" => s.lacking(
-            &s.does("pulls unevenly along its turn", "pull unevenly along their turns"),
-            "amplitude",
-            "ripple",
-        ),
+        "torque_ripple" => {
+            s.lacking(&s.does("pulls unevenly along its way", "pull unevenly along their ways"), "amplitude", "ripple")
+        }
         "joint_elasticity" => {
             let clause = s.does("has a spring between motor and link", "have springs between motor and link");
             s.told(&clause, "stiffness", "", "")
@@ -136,7 +134,7 @@ pub fn of(effect: &FoundEffect, all: &[String], sums: &[Combination]) -> String 
         "servo_damping_error" => s.told(&format!("At {place} the servo damps more than was given"), "damping", "", ""),
         "speed_limit" => {
             let limit = s.size("limit").unwrap_or("its limit".into());
-            format!("{} no faster than {limit}", s.does("turns", "turn"))
+            format!("{} no faster than {limit}", s.does("moves", "move"))
         }
         "dead_band" => match s.size("width") {
             Some(width) => format!("At {place} the servo rests within {width} of its set point"),

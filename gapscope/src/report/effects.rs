@@ -23,7 +23,7 @@ pub fn render(effects: &[FoundEffect], joints: &[String], shrinks: &str, nothing
                     th scope="col" { "effect" }
                     th scope="col" { "joints" }
                     th scope="col" { "confidence" }
-                    th.number scope="col" { (shrinks) span.muted { " [95 %]" } }
+                    th.number scope="col" { (shrinks) @if effects.iter().any(|e| e.shrink.ci95.is_some()) { span.muted { " [95 %]" } } }
                     th scope="col" { "cannot be told from" }
                 }
             }
@@ -46,8 +46,9 @@ fn row(effect: &FoundEffect, all: &[String], shrinks: &str) -> Markup {
                 }
                 td.joints data-label="joints" title=(effect.joints.join(", ")) { (words::joints(&effect.joints, all)) }
                 td.nowrap data-label="confidence" { (meter(effect.confidence)) " " (format::probability_figure(effect.confidence)) "\u{202f}%" }
-                td.number data-label=(shrinks) {
-                    @let grows = effect.shrink.torque.is_some_and(|part| part < 0.0);
+                @let grows = effect.shrink.torque.is_some_and(|part| part < 0.0);
+                // On a card the label stands before the figure, which then says that it grows.
+                td.number data-label=(if grows { shrinks.trim_end_matches(" shrinks by") } else { shrinks }) {
                     @if grows { "grows by " }
                     (effect.shrink.torque.map_or(unknown.into(), |part| percent_within(part.abs(), effect.shrink.ci95)))
                     @if let Some([low, high]) = effect.shrink.ci95 {
@@ -109,16 +110,16 @@ fn joint_table(parameters: &[(&String, &BTreeMap<String, Estimate>)], all: &[Str
                 @for joint in joints {
                     tr {
                         th scope="row" { span.name { (words::breaking(joint)) } }
-                        @for (_, map) in parameters {
+                        @for (name, map) in parameters {
                             td.number {
                                 @match map.get(joint) {
-                                    Some(estimate) => (cell(estimate)),
+                                    Some(estimate) => (cell(estimate, format::greatest(map.values(), &estimate.unit))),
                                     None => (format::NONE),
                                 }
                             }
                             @if drawn {
                                 td.interval aria-hidden="true" {
-                                    @if let Some(estimate) = map.get(joint) { (interval(estimate, reach(map, &estimate.unit))) }
+                                    @if let Some(estimate) = map.get(joint) { (interval(estimate, reach(map, &estimate.unit, none(name)), none(name))) }
                                 }
                             }
                         }
@@ -129,16 +130,21 @@ fn joint_table(parameters: &[(&String, &BTreeMap<String, Estimate>)], all: &[Str
     }
 }
 
-/// Smallest and largest end of the intervals of a parameter in one unit, zero included.
-fn reach(map: &BTreeMap<String, Estimate>, unit: &str) -> [f64; 2] {
+/// The value of a parameter at which there is no effect.
+fn none(parameter: &str) -> f64 {
+    if parameter == "gain" { 1.0 } else { 0.0 }
+}
+
+/// Smallest and largest end of the intervals of a parameter in one unit, the value of no effect included.
+fn reach(map: &BTreeMap<String, Estimate>, unit: &str, none: f64) -> [f64; 2] {
     let ends = map.values().filter(|e| e.unit == unit);
     let ends = ends.flat_map(|e| e.ci95.iter().chain([&e.value]).flat_map(format::numbers));
     let ends = ends.filter(|v| v.is_finite());
-    ends.fold([0.0, 0.0], |[from, to], v| [f64::min(from, v), f64::max(to, v)])
+    ends.fold([none, none], |[from, to], v| [f64::min(from, v), f64::max(to, v)])
 }
 
-/// A dot on its interval, on a scale that the joints share and that holds zero.
-fn interval(estimate: &Estimate, [from, to]: [f64; 2]) -> Markup {
+/// A dot on its interval, on a scale that the joints share; a line stands at the value of no effect.
+fn interval(estimate: &Estimate, [from, to]: [f64; 2], none: f64) -> Markup {
     let scalar = |q| {
         if let [one] = format::numbers(q).as_slice() { Some(*one) } else { None }
     };
@@ -152,15 +158,15 @@ fn interval(estimate: &Estimate, [from, to]: [f64; 2]) -> Markup {
     let at = |v: f64| format!("{}%", short(2.0 + 96.0 * (v - from) / (to - from)));
     html! {
         svg.dot-line width="100%" height="14" {
-            line.base x1=(at(0.0)) x2=(at(0.0)) y1="0" y2="100%" {}
+            line.base x1=(at(none)) x2=(at(none)) y1="0" y2="100%" {}
             line.whisker x1=(at(low)) x2=(at(high)) y1="7" y2="7" {}
             circle cx=(at(value)) cy="7" r="3.2" {}
         }
     }
 }
 
-fn cell(estimate: &Estimate) -> Markup {
-    let printed = format::estimate(estimate);
+fn cell(estimate: &Estimate, greatest: f64) -> Markup {
+    let printed = format::estimate_beside(estimate, greatest);
     html! {
         b { (printed.value) } (with_unit("", &printed.unit))
         @for interval in &printed.interval { " " span.muted.nowrap { (interval) } }
@@ -180,7 +186,8 @@ fn single_table(parameters: &[(&String, &Estimate)]) -> Markup {
             }
             tbody {
                 @for (name, estimate) in parameters {
-                    @let printed = format::estimate(estimate);
+                    @let greatest = format::greatest(parameters.iter().map(|(_, other)| *other), &estimate.unit);
+                    @let printed = format::estimate_beside(estimate, greatest);
                     @let several = printed.components.len();
                     @for (i, (value, interval)) in printed.components.iter().zip(&printed.interval).enumerate() {
                         tr {

@@ -152,12 +152,24 @@ pub fn with_unit(text: &str, unit: &str) -> String {
 
 /// An estimate, scaled and rounded for print.
 pub fn estimate(estimate: &Estimate) -> Printed {
+    estimate_beside(estimate, 0.0)
+}
+
+/// The greatest size among the numbers of estimates with this unit.
+pub fn greatest<'a>(estimates: impl IntoIterator<Item = &'a Estimate>, unit: &str) -> f64 {
+    let same = estimates.into_iter().filter(|estimate| estimate.unit == unit);
+    let sizes = same.flat_map(|estimate| numbers(&estimate.value)).map(f64::abs);
+    sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
+}
+
+/// An estimate in the unit that it shares with others in one table, of which this is the greatest size.
+pub fn estimate_beside(estimate: &Estimate, greatest: f64) -> Printed {
     let values = numbers(&estimate.value);
     let (low, high) = (numbers(&estimate.ci95[0]), numbers(&estimate.ci95[1]));
     let mut all = values.clone();
     all.extend(&low);
     all.extend(&high);
-    let scale = Scale::of(&all, &estimate.unit);
+    let scale = Scale::of(&[&all[..], &[greatest]].concat(), &estimate.unit);
     let half = |i: usize| match (low.get(i), high.get(i)) {
         (Some(from), Some(to)) => (to - from) / 2.0,
         _ => f64::NAN,
@@ -364,6 +376,8 @@ mod tests {
         assert_eq!((delay.value.as_str(), delay.unit.as_str()), ("4.20", "ms"));
         let narrow = estimate(&scalar(1.2341, 1.2336, 1.2346, "kg"));
         assert_eq!((narrow.value.as_str(), narrow.interval[0].as_str()), ("1.2341", "[1.2336,\u{a0}1.2346]"));
+        let beside = estimate_beside(&scalar(0.0042, 0.0039, 0.0045, "s"), 0.5);
+        assert_eq!((beside.value.as_str(), beside.unit.as_str()), ("0.00420", "s"), "one table, one unit");
         let zero = estimate(&scalar(0.0001, -0.05, 0.05, "N m"));
         assert_eq!(zero.interval[0], "[−0.0500,\u{a0}0.0500]");
     }

@@ -1,12 +1,15 @@
 //! What a page holds a model to: each joint's gap and its lines over time, whether of torque or of position.
 
+use super::effort::Effort;
 use super::words;
 use gapscope_diagnosis::schema::{Diagnosis, Evidence, Series, TorqueGap};
 
 /// The gap of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gauge {
-    /// The quantity: `torque` or `position`.
+    /// What the drives push with.
+    pub effort: Effort,
+    /// The quantity: the word of the effort, or `position`.
     pub what: &'static str,
     /// The model before the corrections, as legends call it.
     pub nominal: &'static str,
@@ -72,12 +75,15 @@ impl Gauge {
             // A model with no effects is the model as described.
             series.iter_mut().for_each(|lines| lines.corrected.clear());
         }
+        let joints: Vec<JointGap> = diagnosis.joints.iter().map(joint).collect();
+        let effort = Effort::of_units(joints.iter().map(|joint| joint.unit.as_str()));
         Gauge {
-            what: "torque",
+            effort,
+            what: effort.word(),
             nominal: "model as described",
             corrected: "model with the effects",
             robot: diagnosis.robot.clone(),
-            joints: diagnosis.joints.iter().map(joint).collect(),
+            joints,
             series,
         }
     }

@@ -68,7 +68,7 @@ pub fn render(
                 }
             }
         }
-        @if first { (legend(whole)) } @else { p.legend { "Share of " (whole) ", %; shade and frame as in the table of the whole gap." } }
+        @if first { (legend(whole, groups.iter().flat_map(|group| &group.columns).any(|column| column.heading.is_empty()))) } @else { p.legend { "Share of " (whole) ", %; shade and frame as in the table of the whole gap." } }
     }
 }
 
@@ -137,13 +137,13 @@ fn whole_percent(share: f64) -> String {
     if share > 0.0 && share < 0.005 { "<1".into() } else { fixed(100.0 * share, 0) }
 }
 
-fn legend(whole: &str) -> Markup {
+fn legend(whole: &str, own_bounds: bool) -> Markup {
     html! {
         ul.legend.keys {
             li { span.key.number aria-hidden="true" { "26" } span { "Share of " (whole) ", %: half the rms is a quarter of the square. Regimes overlap, so a row does not add up to 100." } }
-            li { span.key.ramp aria-hidden="true" { i {} } span { "The darker, the more of the gap for its part of the samples; joints at the noise floor stay pale." } }
+            li { span.key.ramp aria-hidden="true" { i {} } span { "The stronger the colour, the more of the gap for its part of the samples; joints at the noise floor stay pale." } }
             li { span.key.marked aria-hidden="true" { "62" small { "7.8×" } } span { "Framed: at least 1.5 times its part of the samples, with the whole 95 % interval. The small figure is that factor." } }
-            li.muted { span {} span { "Regimes without bounds in the head have bounds of each joint’s own: pointing at a cell shows them." } }
+            @if own_bounds { li.muted { span {} span { "Regimes without bounds in the head have bounds of each joint’s own: pointing at a cell shows them." } } }
         }
     }
 }
@@ -171,7 +171,13 @@ fn columns<'a>(name: &str, joints: &[&String], regimes: &'a [Regime]) -> Vec<Col
             let mut bounds: Vec<_> = cells.iter().flatten().map(|r| &r.bounds).collect();
             bounds.dedup();
             let heading = match bounds.as_slice() {
-                [one] => words::interval(one).replace('–', "–\u{2060}").replace('\u{a0}', " "),
+                [one] => {
+                    // A line may end before the unit, and nowhere else.
+                    let unit = one.unit.replace(' ', "\u{a0}");
+                    words::interval(one)
+                        .replace('–', "–\u{2060}")
+                        .replace(&format!("\u{a0}{unit}"), &format!(" {unit}"))
+                }
                 _ if count > 1 => format!("{} of {count}", i + 1),
                 // Each joint has its own: the tip of a cell says them.
                 _ => String::new(),

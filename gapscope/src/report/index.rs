@@ -1,5 +1,6 @@
 //! An index over many diagnoses: one page with a table to sort and filter, and any two side by side.
 
+use super::effort::Effort;
 use super::format::{NONE, group, percent, probability_figure};
 use super::{plain, ticked, words};
 use gapscope_diagnosis::schema::{Change, Diagnosis, Verdict};
@@ -8,6 +9,9 @@ use maud::{Markup, PreEscaped, html};
 const SCRIPT: &str = include_str!("script/index.js");
 /// Effects that a row names; the two side by side have them all.
 const NAMED: usize = 3;
+
+/// Files left out that stand above the table; the rest folds away.
+const LEFT_OUT: usize = 3;
 
 /// Headings; figures from the fifth on.
 const HEADS: [&str; 9] =
@@ -52,15 +56,19 @@ impl From<&Diagnosis> for Found {
     fn from(found: &Diagnosis) -> Found {
         let [before, after] = gaps(&found.shrink.torque, found.effects.is_empty());
         let effects = plain::together(found);
+        let effort = Effort::of(&found.gap.regimes);
         let detail = |e: &gapscope_diagnosis::schema::FoundEffect| {
             let (kind, place) = (words::capital(&words::effect(&e.kind)), words::joints(&e.joints, &found.joints));
-            format!("{kind}, {place}, {}\u{202f}% sure", probability_figure(e.confidence))
+            format!("{}, {place}, {}\u{202f}% sure", effort.say(&kind), probability_figure(e.confidence))
         };
         Found {
             robot: found.robot.clone(),
             verdict: words::verdict(found.verdict).into(),
             tone: super::tone_of(found.verdict, found.data.faults.is_empty() && found.data.doubts.is_empty()),
-            effects: words::effects(&effects.iter().map(|e| e.kind.clone()).collect::<Vec<_>>()),
+            effects: words::effects(&effects.iter().map(|e| e.kind.clone()).collect::<Vec<_>>())
+                .iter()
+                .map(|name| effort.say(name))
+                .collect(),
             sure: effects.first().map(|e| e.confidence),
             gap: [before, after].map(|gap| (gap, percent(gap))),
             left: found.unexplained.fraction,
@@ -75,8 +83,10 @@ impl From<&gapscope_servo::schema::Diagnosis> for Found {
     fn from(found: &gapscope_servo::schema::Diagnosis) -> Found {
         let change = &found.shrink.position;
         let [before, after] = [change.before, change.after].map(|gap| gap.unwrap_or(f64::NAN));
-        let gap =
-            |gap: f64, beside: f64| (gap, if gap.is_finite() { super::servo::angle(gap, beside) } else { NONE.into() });
+        let unit = super::servo::unit(&found.gap.regimes, None);
+        let gap = |gap: f64, beside: f64| {
+            (gap, if gap.is_finite() { super::servo::offset(gap, beside, unit) } else { NONE.into() })
+        };
         let gaps = [gap(before, after), gap(after, before)];
         let verdict = super::servo::schema::verdict(&found.verdict);
         let list = found.effects.iter();
@@ -117,7 +127,13 @@ pub fn page(title: &str, entries: &[Entry], left_out: &[String]) -> String {
                 @let faulty = entries.iter().filter(|entry| !entry.found.faults.is_empty()).count();
                 @if faulty > 0 { span.partly { (group(faulty)) " with faults of the data" } }
             }
-            @for text in left_out { p.fault { (text) } }
+            @for text in left_out.iter().take(LEFT_OUT) { p.fault { (text) } }
+            @if left_out.len() > LEFT_OUT {
+                details {
+                    summary { "and " (group(left_out.len() - LEFT_OUT)) " more that are left out" }
+                    @for text in &left_out[LEFT_OUT..] { p.fault { (text) } }
+                }
+            }
         }
         main {
             div.tools.needs-script {
@@ -141,7 +157,7 @@ pub fn page(title: &str, entries: &[Entry], left_out: &[String]) -> String {
                     tbody { @for (i, entry) in entries.iter().enumerate() { (row(i, entry)) } }
                 }
             }
-            p.note { "Gap of the torque: weighted rms, parts of the effort’s spread, on held-out data; of an arm without torque: the angle by which its free run is off. Unexplained: of the squared gap." }
+            p.note { "Gap of the effort, a torque or force: weighted rms, parts of its spread, on held-out data. Of a servo arm, whose logs hold none: by how much its free run is off. Unexplained: of the squared gap." }
             details { summary { "All answers in words" } div #answers { @for (i, entry) in entries.iter().enumerate() { (card(i, entry)) } } }
         }
         script { (PreEscaped(SCRIPT)) }

@@ -9,6 +9,7 @@ mod chart;
 pub mod clause;
 mod curves;
 mod effects;
+pub mod effort;
 mod format;
 mod gauge;
 mod heatmap;
@@ -119,10 +120,13 @@ fn report(gauge: &Gauge, top: &Top, scene: Option<&scene::Scene>, body: &Markup,
     let packet = Packet { words, series: series::packets(gauge), scene: scene.map(scene::Scene::packet) };
     // A name that closes the script would end it: no text of JSON needs the sign as such.
     let data = serde_json::to_string(&packet).unwrap_or_default().replace('<', "\\u003c");
-    let content = html! {
+    let said = html! {
         (header(gauge, top, scene))
         (contents(body))
         main { (body) }
+    };
+    let content = html! {
+        (PreEscaped(gauge.effort.say_page(&said.0)))
         p #filter role="status" hidden { "Showing " b {} " only " button type="button" { "Show all joints" } }
         script type="application/json" id="packet" { (PreEscaped(data)) }
         script { (PreEscaped(format!("/*\n{CHART_LICENCE}*/\n{CHART}"))) }
@@ -264,7 +268,6 @@ fn section(id: &str, title: &str, lead: &str, content: &Markup) -> Markup {
 }
 
 fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Setting) -> Markup {
-    let playable = setting.scene.as_ref().is_some_and(|scene| scene.plays.iter().any(|play| play.name == scene::NEXT));
     let evaluated = diagnosis.verdict != Verdict::NotExcited || !diagnosis.gap.torque.rms.is_empty();
     let robot = match evidence.robot_file.as_str() {
         "" => "ROBOT.urdf".to_owned(),
@@ -292,7 +295,10 @@ fn body(gauge: &Gauge, diagnosis: &Diagnosis, evidence: &Evidence, setting: &Set
         @if let Some(why) = why::render(&diagnosis.why, &diagnosis.joints) {
             (section("why", "Why it is so", "What was proposed, against what, and by how much the logs spoke for it.", &why))
         }
-        (section("next", "The next experiment", "", &rest::next_experiment(diagnosis, playable)))
+        (section("next", "The next experiment", "", &{
+            let none = rest::none_proposed(diagnosis.verdict);
+            rest::next_experiment(diagnosis.next_experiment.as_ref(), none, setting.scene.as_ref().is_some_and(scene::Scene::plays_next))
+        }))
         @if !diagnosis.power.is_empty() {
             (section("power", "What these logs could have revealed", "The least size of each effect that would have been found. Anything smaller could be there, and nobody could tell from these logs.",
                 &power::render(diagnosis)))

@@ -2,6 +2,7 @@
 //!
 //! The terminal and the page begin with these very words.
 
+use super::effort::Effort;
 use super::format::{count, figure, percent, plain, with_unit};
 use super::{clause, words};
 use gapscope_datasets::Fault;
@@ -16,7 +17,8 @@ const SAME: f64 = 0.01;
 
 /// What it is, how far it shrinks, what to beware of or where it lies: one line each.
 pub fn answer(diagnosis: &Diagnosis) -> [String; 3] {
-    [cause(diagnosis), reach(diagnosis), caution(diagnosis)]
+    let effort = Effort::of(&diagnosis.gap.regimes);
+    [cause(diagnosis), reach(diagnosis), caution(diagnosis)].map(|line| effort.say(&line))
 }
 
 fn cause(diagnosis: &Diagnosis) -> String {
@@ -139,7 +141,7 @@ fn caution(diagnosis: &Diagnosis) -> String {
             let unit = words::implied_unit(joint, &diagnosis.gap.regimes);
             format!("The gap is largest at {joint}, {} rms", with_unit(&figure(rms), unit))
         }
-        None => "No torque gap could be evaluated".into(),
+        None => "No gap could be evaluated".into(),
     };
     match diagnosis.verdict {
         Verdict::NoGap => format!("{place}."),

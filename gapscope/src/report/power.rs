@@ -8,6 +8,9 @@ use maud::{Markup, html};
 /// Kinds that a line of text names.
 const TOLD: [&str; 4] = ["coulomb_friction", "viscous_friction", "torque_bias", "payload"];
 
+/// A mass that no joint carries, kg: where only more would show, nothing does.
+const NO_BODY: f64 = 1e3;
+
 /// Joints that have a column each; of more the least and the greatest size stand with their joints.
 const COLUMNS: usize = 12;
 
@@ -61,7 +64,11 @@ pub fn line(power: &[Power]) -> Option<String> {
     let told: Vec<String> = TOLD
         .iter()
         .filter_map(|kind| {
-            let sizes: Vec<&Power> = power.iter().filter(|p| p.kind == *kind && p.size.is_some()).collect();
+            let mut sizes: Vec<&Power> = power.iter().filter(|p| p.kind == *kind && p.size.is_some()).collect();
+            // Joints that slide have another unit than those that turn: the commoner one is told.
+            let of = |unit: &str| sizes.iter().filter(|p| p.unit == unit).count();
+            let unit = sizes.iter().max_by_key(|p| of(&p.unit))?.unit.clone();
+            sizes.retain(|p| p.unit == unit);
             let size = |p: &&Power| p.size.unwrap_or(f64::NAN);
             let least = sizes.iter().map(size).fold(f64::INFINITY, f64::min);
             let most = sizes.iter().map(size).fold(0.0, f64::max);
@@ -102,7 +109,7 @@ fn ends(row: &[&Power]) -> [String; 2] {
 }
 
 fn cell(row: &[&Power], here: impl Fn(&Power) -> bool) -> String {
-    let size = row.iter().find(|p| here(p)).and_then(|p| p.size);
+    let size = row.iter().find(|p| here(p)).and_then(|p| p.size).filter(|size| *size < NO_BODY || row[0].unit != "kg");
     size.map_or(NONE.into(), |size| significant(size, 2))
 }
 

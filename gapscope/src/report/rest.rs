@@ -2,7 +2,7 @@
 
 use super::format::{NONE, count, figure, group, percent, plain, with_interval, with_unit};
 use super::{heatmap, words};
-use gapscope_diagnosis::schema::{Combination, Diagnosis, Evidence, Gap, Verdict};
+use gapscope_diagnosis::schema::{Combination, Diagnosis, Evidence, Gap, NextExperiment, Verdict};
 use maud::{Markup, html};
 
 /// Less than this part of the squared gap is a trace: its map folds away.
@@ -95,15 +95,17 @@ pub fn alternatives(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-/// The motion that would tell more; `playable` where the robot on the page can play it.
-pub fn next_experiment(diagnosis: &Diagnosis, playable: bool) -> Markup {
-    let Some(next) = &diagnosis.next_experiment else {
-        let text = match diagnosis.verdict {
-            Verdict::NoGap | Verdict::Explained => "None needed: these logs leave nothing to separate.",
-            _ => "None proposed.",
-        };
-        return html! { p { (text) } };
-    };
+/// What is said where no motion is proposed.
+pub fn none_proposed(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NoGap | Verdict::Explained => "None needed: these logs leave nothing to separate.",
+        _ => "None proposed.",
+    }
+}
+
+/// The motion that would tell more, or `none`; `playable` where the robot on the page can play it.
+pub fn next_experiment(next: Option<&NextExperiment>, none: &str, playable: bool) -> Markup {
+    let Some(next) = next else { return html! { p { (none) } } };
     html! {
         div.callout {
             @let told = words::sentences(&words::in_words(&next.motion));
@@ -111,7 +113,7 @@ pub fn next_experiment(diagnosis: &Diagnosis, playable: bool) -> Markup {
             p { b { (super::ticked(act.trim_end_matches('.'))) "." } }
             p { (super::ticked(&words::sentences(&words::in_words(&next.why)))) @if !gain.is_empty() { " " (super::ticked(gain)) } }
             @if let Some(file) = &next.trajectory {
-                p { code { (file) } " beside this report holds time, position, velocity and acceleration of every joint, from rest to rest, within the URDF’s limits. Diagnose its log together with these." }
+                p { code { (file) } " beside this report has time, position, velocity and acceleration of every joint, from rest to rest, within the URDF’s limits. Diagnose its log together with these." }
             }
             @if playable {
                 p.tools.needs-script { button type="button" data-play=(super::scene::NEXT) { "Play it on the robot above" } }

@@ -2,6 +2,7 @@
 
 use super::axis::Axis;
 use super::chart::{Plot, band, envelope, line};
+use super::effort::Effort;
 use super::format::{count, figure, with_unit};
 use super::gauge::{Gauge, JointGap};
 use super::packed::{self, Packed};
@@ -54,7 +55,7 @@ fn stretch(series: &Series) -> [Panel; 2] {
         error.insert(0, of(effects, &|i| series.measured[i] - series.corrected[i]));
     }
     let x = Axis::tight(kept.iter().map(|&i| series.time[i]), "time, s", 6);
-    [("torque", torque), ("measured − model", error)].map(|(what, lines)| {
+    [(Effort::of_units([unit.as_str()]).word(), torque), ("measured − model", error)].map(|(what, lines)| {
         let values = lines.iter().flat_map(|line| &line.points).map(|p| p[1]);
         let y = Axis::padded(values, &format!("{what}, {unit}"), 4);
         Panel { title: series.joint.clone(), x: x.clone(), y, series: lines, rules: vec![] }

@@ -4,6 +4,7 @@ mod answer;
 mod change;
 pub mod schema;
 
+use super::effort::Effort;
 use super::format::{self, percent, percent_interval, percent_within, with_unit};
 use super::gauge::{Figure, Gauge, JointGap};
 use super::scene::Scene;
@@ -18,8 +19,11 @@ use gapscope_servo::{Evidence, Outcome, Signal};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
-pub use answer::{angle, answer, nominal};
+pub use answer::{answer, nominal, offset, unit};
 
+/// What is said where no further set points are proposed.
+const NONE_PROPOSED: &str =
+    "None: every number is known to a tenth of itself, or no motion of 20 s would tell it much better.";
 /// Part of a joint's samples whose speed a curve shows: the fastest are noise of the encoder.
 const USUAL: f64 = 0.99;
 
@@ -74,11 +78,21 @@ impl Beside {
         &self.warnings
     }
 
+    /// What the drives push with.
+    pub fn effort(&self) -> Effort {
+        Effort::of_units(self.units.values().map(|unit| if *unit == "mm" { "N" } else { "N m" }))
+    }
+
     /// Adds what a diagnosis made of the logs.
     #[must_use]
-    pub fn with(mut self, model: &Model, episodes: &[Episode], evidence: &Evidence) -> Beside {
+    pub fn with(mut self, model: &Model, episodes: &[Episode], outcome: &Outcome) -> Beside {
+        let evidence = &outcome.evidence;
         let scene = Scene::new(model, episodes);
-        self.scene = Some(scene.with_free_run(model, episodes, &evidence.nominal, &evidence.corrected));
+        let scene = scene.with_free_run(model, episodes, &evidence.nominal, &evidence.corrected);
+        self.scene = Some(match &outcome.trajectory {
+            Some(motion) => scene.with_motion(model, motion),
+            None => scene,
+        });
         for (j, joint) in model.joints().iter().enumerate() {
             let [unit, small] = if joint.kind == JointKind::Prismatic { ["m", "mm"] } else { ["rad", "mrad"] };
             self.series.push(lines(&joint.name, unit, j, episodes, evidence));
@@ -165,6 +179,7 @@ fn gauge(diagnosis: &Diagnosis, evidence: &Evidence, beside: &Beside) -> Gauge {
         floor: scaled(&gap.floor, name),
     };
     Gauge {
+        effort: beside.effort(),
         what: "position",
         nominal: nominal(diagnosis),
         corrected: "the arm found here",
@@ -215,6 +230,9 @@ fn body(
         @if let Some(why) = why::render(&schema::why(&diagnosis.why), all) {
             (section("why", "Why it is so", "What was proposed, against what, and by how much the logs spoke for it.", &why))
         }
+        @let next = diagnosis.next_experiment.as_ref().map(schema::next_experiment);
+        (section("next", "The next experiment", "",
+            &rest::next_experiment(next.as_ref(), NONE_PROPOSED, beside.scene.as_ref().is_some_and(Scene::plays_next))))
         (section("data", "Data and findings", "", &rest::data(&top.read)))
         (section("reproduce", "How to reproduce", "", &reproduce::render(&reproduce::Made {
             robot: &beside.robot_file,
@@ -237,11 +255,12 @@ fn weighted(diagnosis: &Diagnosis) -> String {
     };
     let interval =
         change.ci95.map_or_else(String::new, |ends| format!(" (95\u{202f}% interval {})", percent_interval(ends)));
+    let unit = unit(&diagnosis.gap.regimes, None);
     let moves = if shrink < 0.0 { "grows" } else { "shrinks" };
     format!(
         "{lead} Over all joints, each by how far it is told to move, it {moves} from {} to {}, by {}{interval}.",
-        angle(before, after),
-        angle(after, before),
+        offset(before, after, unit),
+        offset(after, before, unit),
         percent_within(shrink.abs(), change.ci95)
     )
 }
@@ -252,6 +271,26 @@ fn unexplained(diagnosis: &Diagnosis) -> String {
         return "Nothing above the encoder’s own step.".into();
     }
     format!("{} of the squared position gap is left above the encoder’s own step.", percent(fraction))
+}
+
+/// The kinds that say a constant is not the given one.
+const OTHERWISE: [(&str, &str); 4] = [
+    ("stiffness", "servo_gain_error"),
+    ("damping", "servo_damping_error"),
+    ("speed_limit", "speed_limit"),
+    ("dead_band", "dead_band"),
+];
+
+/// Whether a constant of a joint is known, in words; nothing where the logs tell it.
+pub fn known(diagnosis: &Diagnosis, joint: &str, name: &str) -> Option<&'static str> {
+    let drive = diagnosis.drive.get(joint)?;
+    let otherwise =
+        |kind: &str| diagnosis.effects.iter().any(|e| e.kind == kind && e.joints.iter().any(|j| j == joint));
+    if drive.given.iter().any(|given| given == name) {
+        let found = OTHERWISE.iter().any(|(constant, kind)| *constant == name && otherwise(kind));
+        return Some(if found { "not the given one" } else { "given" });
+    }
+    drive.constants.get(name).is_some_and(|found| !found.determined).then_some("not determined")
 }
 
 /// What a drive follows.
@@ -276,7 +315,7 @@ fn drives(diagnosis: &Diagnosis) -> Markup {
                     tbody data-joints=(super::listed(std::slice::from_ref(joint))) {
                         tr { th scope="rowgroup" colspan="3" { b { (joint) } span.muted { " follows its " (follows(drive)) } } }
                         @if drive.constants.is_empty() { tr { td.muted colspan="3" { "No constant is determined." } } }
-                        @for (name, found) in &drive.constants { (constant(name, found, drive.given.contains(name))) }
+                        @for (name, found) in &drive.constants { (constant(name, found, known(diagnosis, joint, name))) }
                     }
                 }
             }
@@ -290,18 +329,15 @@ fn drives(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-fn constant(name: &str, found: &Estimate, given: bool) -> Markup {
+fn constant(name: &str, found: &Estimate, known: Option<&str>) -> Markup {
     let printed = format::estimate(&schema::estimate(found));
     html! {
         tr {
             td { (words::parameter(name)) }
             td.number { b { (printed.value) } (with_unit("", &printed.unit)) }
             td.number {
-                @if given { span.muted { "given" } }
-                @else {
-                    (printed.interval.join(" "))
-                    @if !found.determined { " " span.muted { "not determined" } }
-                }
+                @if known != Some("given") { (printed.interval.join(" ")) " " }
+                @if let Some(known) = known { span.muted { (known) } }
             }
         }
     }

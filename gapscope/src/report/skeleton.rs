@@ -76,6 +76,10 @@ pub fn picture(gauge: &Gauge, scene: Option<&Scene>) -> Markup {
                 }
                 // Above all joints, or those in front would hide them.
                 g.labels aria-hidden="true" {
+                    @for ([x, y], end) in labels(&ends).iter().zip(&ends) {
+                        @let [x1, y1, x2, y2] = leader(*end, [*x, *y]);
+                        line.leader x1=(short3(x1)) y1=(short3(y1)) x2=(short3(x2)) y2=(short3(y2)) {}
+                    }
                     @for (j, [x, y]) in labels(&ends).iter().enumerate() {
                         text x=(short3(*x)) y=(short3(*y)) { (j + 1) }
                     }
@@ -125,6 +129,17 @@ fn labels(ends: &[[f64; 2]]) -> Vec<[f64; 2]> {
     }
     placed
 }
+
+/// A line from a joint to a number that stands far from it; of no length to one beside it. The script does the same.
+fn leader([x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) -> [f64; 4] {
+    let right = to_x > x;
+    let side = if right { to_x - 0.02 } else { to_x + 0.08 };
+    let far = (to_x - x).abs() > FAR[usize::from(right)] || (to_y - y).abs() > FAR[2];
+    if far { [x, y, side, to_y - 0.02] } else { [x, y, x, y] }
+}
+
+/// How far a number may stand to the left, to the right and above or below before a line leads to it.
+const FAR: [f64; 3] = [0.12, 0.06, 0.11];
 
 /// Joints whose numbers stand beside them; of more each shows as it is pointed at.
 const LABELLED: usize = 12;

@@ -99,6 +99,34 @@ fn holds_every_effect_of_the_catalogue() {
 }
 
 #[test]
+fn slides_have_forces_and_a_robot_of_both_kinds_has_efforts() {
+    for (sliding, word, other) in [(7, "force", "torque"), (3, "effort", "torque")] {
+        let (_, mut diagnosis, mut evidence) = sample::explained();
+        let slides: Vec<String> = diagnosis.joints[..sliding].to_vec();
+        for regime in diagnosis.gap.regimes.iter_mut().filter(|r| slides.contains(&r.joint)) {
+            regime.bounds.unit = "m/s".into();
+        }
+        evidence.torque.iter_mut().filter(|s| slides.contains(&s.joint)).for_each(|s| s.unit = "N".into());
+        diagnosis.effects[0].kind = "torque_bias".into();
+        let page = html(&diagnosis, &evidence, &Setting::default());
+        let capital = words::capital(word);
+        for part in [
+            format!("<h2 id=\"joints-title\">{capital} gap by joint"),
+            format!("<h2 id=\"over-time-title\">{capital} over time"),
+            format!("{capital} bias <code>torque_bias</code>"),
+            format!("With them the {word} gap falls"),
+            format!("\"what\":\"{word}\""),
+        ] {
+            assert!(page.contains(&part), "{part}");
+        }
+        let said = without_scripts(&page);
+        let said = said.split("</style>").nth(1).unwrap().replace("torque_", "");
+        let at = said.to_lowercase().find(other).map(|at| said[at.saturating_sub(60)..at + 20].to_owned());
+        assert_eq!(at, None, "the other word is nowhere");
+    }
+}
+
+#[test]
 fn escapes_names() {
     let (_, diagnosis, evidence) = sample::no_gap();
     let page = html(&diagnosis, &evidence, &Setting::default());
@@ -135,7 +163,7 @@ fn shows_units_and_intervals() {
     }
     let (_, diagnosis, evidence) = sample::prismatic();
     let page = html(&diagnosis, &evidence, &Setting::default());
-    assert!(page.contains("torque, N<") && !page.contains("N\u{a0}m") && !page.contains("rad/s"));
+    assert!(page.contains("force, N<") && !page.contains("N\u{a0}m") && !page.contains("rad/s"));
 }
 
 #[test]

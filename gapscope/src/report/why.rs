@@ -28,7 +28,10 @@ pub fn render(why: &[Why], joints: &[String]) -> Option<Markup> {
         }
     };
     Some(html! {
-        p.note { "In nats: 3 are odds of twenty to one." }
+        p.note {
+            "In nats: 3 are odds of twenty to one."
+            @if taken.iter().any(|why| why.odds < 0.0) { " Below zero: the logs speak more for the account that it stands against." }
+        }
         (group("Taken", &taken, true))
         (group("Turned down", &not, false))
     })

@@ -1,12 +1,13 @@
 //! The diagnosis and the evaluation of a servo arm as a few lines for the terminal, in the order of those of torque.
 
-use crate::report::servo::{angle, answer as three, follows, nominal, schema};
+use crate::report::effort::Effort;
+use crate::report::servo::{answer as three, follows, known, nominal, offset, schema, unit};
 use crate::report::terminal::{INDENT, Paint, block, clean, column, name, pad, wrap};
 use crate::report::{
-    Beside, count, joint_list, parameter, percent, percent_interval, percent_within, plain as rounded, verdict,
-    with_unit,
+    Beside, count, in_words, joint_list, parameter, percent, percent_interval, percent_within, plain as rounded,
+    sentences as sentences_of, verdict, with_unit,
 };
-use crate::summary::{faults, ordinary_spaces, regime_rows, rest, ties, told, which};
+use crate::summary::{faults, ordinary_spaces, regime_rows, rest, said, ties, told, which};
 use gapscope_diagnosis::schema::Verdict;
 use gapscope_servo::schema::{Change, Diagnosis, Estimate, Evaluation, FoundDrive};
 use std::path::Path;
@@ -43,13 +44,14 @@ pub fn summary(diagnosis: &Diagnosis, beside: &Beside, out: Option<&Path>, paint
         with_unit(&rounded(data.duration), "s"),
         with_unit(&rounded(data.rate), "Hz")
     );
-    lines.extend(wrap(&clean(&of), paint.width));
-    block(&mut lines, paint, "Ties", &ties(&schema::effects(&diagnosis.effects)));
+    let effort = effort(diagnosis);
+    lines.extend(wrap(&effort.say(&clean(&of)), paint.width));
+    block(&mut lines, paint, "Ties", &said(effort, &ties(&schema::effects(&diagnosis.effects))));
     let head = format!("{}  {}", paint.verdict(&verdict(word).to_uppercase(), word), headline(diagnosis));
     lines.extend(wrap(&head, paint.width));
     lines.push(String::new());
     block(&mut lines, paint, "Which", &effects(diagnosis, paint));
-    block(&mut lines, paint, "Drives", &drives(diagnosis));
+    block(&mut lines, paint, "Drives", &said(effort, &drives(diagnosis)));
     let mut places: Vec<String> = place(diagnosis).into_iter().collect();
     places.extend(regime_rows(&schema::regimes(&diagnosis.gap.regimes), &|_| true));
     block(&mut lines, paint, "Where", &places);
@@ -58,7 +60,10 @@ pub fn summary(diagnosis: &Diagnosis, beside: &Beside, out: Option<&Path>, paint
     let notes: Vec<&String> = data.findings.iter().filter(|line| !beside.warnings().contains(line)).collect();
     let shown = if paint.terminal { FINDINGS } else { notes.len() };
     let first = notes.iter().take(shown).map(|line| clean(line)).collect();
-    block(&mut lines, paint, "Notes", &rest(first, notes.len(), shown, "finding"));
+    block(&mut lines, paint, "Notes", &said(effort, &rest(first, notes.len(), shown, "finding")));
+    if let Some(next) = &diagnosis.next_experiment {
+        block(&mut lines, paint, "Next", &[effort.say(&clean(&sentences_of(&in_words(&next.motion))))]);
+    }
     if let Some(out) = out {
         lines.push(format!("{} {}", paint.head(&pad("Report", INDENT - 1)), out.join("report.html").display()));
     }
@@ -73,25 +78,33 @@ pub fn why(diagnosis: &Diagnosis, paint: &Paint) -> String {
 /// The evaluation in a few lines: the gap over all logs, by joint and by log.
 pub fn evaluation_summary(evaluation: &Evaluation) -> String {
     let paint = &Paint::plain();
+    let regimes = &evaluation.gap.regimes;
+    let all = unit(regimes, None);
     let mut lines = Vec::new();
     let mut far = vec![];
     if let Some(shrink) = &evaluation.shrink {
-        far.push(format!("free run under the set points: {}", change(&shrink.position)));
+        far.push(format!("free run under the set points: {}", change(&shrink.position, all)));
     }
     if let Some(mean) = evaluation.mean_absolute {
-        far.push(format!("mean absolute error {}", angle(mean, mean)));
+        far.push(format!("mean absolute error {}", offset(mean, mean, all)));
     }
     block(&mut lines, paint, "How far", &far);
     let joint = |(joint, rms): (&String, &f64)| {
-        let after = evaluation.after.get(joint).map_or(String::new(), |after| format!(" → {}", angle(*after, *rms)));
-        clean(&format!("{joint}  {} rms{after}", angle(*rms, *rms)))
+        let own = unit(regimes, Some(joint));
+        let after =
+            evaluation.after.get(joint).map_or(String::new(), |after| format!(" → {}", offset(*after, *rms, own)));
+        clean(&format!("{joint}  {} rms{after}", offset(*rms, *rms, own)))
     };
     block(&mut lines, paint, "Where", &evaluation.gap.position.rms.iter().map(joint).collect::<Vec<_>>());
     let width = column(evaluation.logs.iter().map(|log| log.log.as_str()), 44);
     let shown = evaluation.logs.iter().take(SHOWN);
-    let logs = shown.map(|log| format!("{}  {}", name(&log.log, width), change(&log.position))).collect();
+    let logs = shown.map(|log| format!("{}  {}", name(&log.log, width), change(&log.position, all))).collect();
     block(&mut lines, paint, "Logs", &rest(logs, evaluation.logs.len(), SHOWN, "log"));
     ordinary_spaces(&lines)
+}
+
+fn effort(diagnosis: &Diagnosis) -> Effort {
+    Effort::of(&schema::regimes(&diagnosis.gap.regimes))
 }
 
 fn effects(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
@@ -99,14 +112,14 @@ fn effects(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
         return vec!["no effect is claimed".into()];
     }
     let with = ["with it the gap shrinks by", "with it the gap grows by"];
-    which::rows(&schema::effects(&diagnosis.effects), &diagnosis.joints, with, &|_| None, paint)
+    which::rows(&schema::effects(&diagnosis.effects), (&diagnosis.joints, effort(diagnosis)), with, &|_| None, paint)
 }
 
 /// Each joint with what it follows, its constants, and what the logs leave open.
 fn drives(diagnosis: &Diagnosis) -> Vec<String> {
     let mut rows = vec![];
     for (joint, drive) in diagnosis.joints.iter().filter_map(|joint| Some((joint, diagnosis.drive.get(joint)?))) {
-        rows.push(clean(&format!("{joint} follows its {}{}", follows(drive), constants(drive))));
+        rows.push(clean(&format!("{joint} follows its {}{}", follows(drive), constants(diagnosis, joint, drive))));
     }
     // What several joints leave open is said once.
     let mut open: Vec<(&String, Vec<String>)> = vec![];
@@ -123,14 +136,10 @@ fn drives(diagnosis: &Diagnosis) -> Vec<String> {
     rows
 }
 
-fn constants(drive: &FoundDrive) -> String {
+fn constants(diagnosis: &Diagnosis, joint: &str, drive: &FoundDrive) -> String {
     let cell = |(name, found): (&String, &Estimate)| {
         let value = which::one(&schema::estimate(found))?;
-        let known = match drive.given.contains(name) {
-            true => ", given",
-            false if !found.determined => ", not determined",
-            false => "",
-        };
+        let known = known(diagnosis, joint, name).map_or(String::new(), |known| format!(", {known}"));
         Some(format!("{} {value}{known}", parameter(name)))
     };
     let cells: Vec<String> = drive.constants.iter().filter_map(cell).collect();
@@ -140,11 +149,15 @@ fn constants(drive: &FoundDrive) -> String {
 fn place(diagnosis: &Diagnosis) -> Option<String> {
     let gaps = diagnosis.gap.position.rms.iter().filter(|(_, rms)| rms.is_finite());
     let (joint, rms) = gaps.max_by(|a, b| a.1.total_cmp(b.1))?;
-    Some(clean(&format!("largest at {joint}: {} rms from {}", angle(*rms, *rms), nominal(diagnosis))))
+    let rms = offset(*rms, *rms, unit(&diagnosis.gap.regimes, Some(joint)));
+    Some(clean(&format!("largest at {joint}: {rms} rms from {}", nominal(diagnosis))))
 }
 
 fn reach(diagnosis: &Diagnosis) -> String {
-    format!("free run under the set points, held out: {}", change(&diagnosis.shrink.position))
+    format!(
+        "free run under the set points, held out: {}",
+        change(&diagnosis.shrink.position, unit(&diagnosis.gap.regimes, None))
+    )
 }
 
 fn headline(diagnosis: &Diagnosis) -> String {
@@ -158,7 +171,7 @@ fn headline(diagnosis: &Diagnosis) -> String {
     }
 }
 
-fn change(change: &Change) -> String {
+fn change(change: &Change, unit: &str) -> String {
     match (change.before, change.after) {
         (Some(before), Some(after)) => {
             let sign = |shrink: f64| if shrink < 0.0 { "+" } else { "−" };
@@ -170,10 +183,12 @@ fn change(change: &Change) -> String {
                 let [a, b] = ends.map(f64::abs);
                 format!(" ({})", percent_interval([a.min(b), a.max(b)]))
             });
-            let [from, to] = [angle(before, after), angle(after, before)];
+            let [from, to] = [offset(before, after, unit), offset(after, before, unit)];
             format!("{from} → {to}  {shrink}{}", ends.unwrap_or_default())
         }
-        (Some(before), None) => format!("{} → the arm found here cannot be simulated there", angle(before, before)),
+        (Some(before), None) => {
+            format!("{} → the arm found here cannot be simulated there", offset(before, before, unit))
+        }
         _ => "cannot be simulated".to_owned(),
     }
 }

@@ -6,6 +6,7 @@ mod published;
 use crate::cli::{Input, RealLogs};
 use crate::diagnose::with_progress;
 use crate::input::load;
+use crate::report::effort::Effort;
 use crate::report::terminal::Paint;
 use crate::report::{heatmap_picture, series_picture};
 use crate::{output, summary};
@@ -57,7 +58,9 @@ fn write(folder: &Path, log: &Log, out: &Path) -> Result<String> {
     });
     let others = others.collect::<Result<Vec<Other>>>()?;
     let diagnosis = &outcome.diagnosis;
-    let torque = series_picture("Torque over time, and what the models leave of it", &outcome.evidence);
+    let effort = Effort::of(&diagnosis.gap.regimes);
+    let title = effort.say("Torque over time, and what the models leave of it");
+    let torque = series_picture(&title, &outcome.evidence);
     let rest = heatmap_picture(
         "Where the rest lies, % of what is left at the joint",
         &diagnosis.joints,

@@ -1,9 +1,9 @@
 //! Logs of real servo arms: identified on some, run free on the others, each machine written up as a page.
 
 use crate::cli::{Input, RealLogs};
-use crate::input::{Loaded, load};
+use crate::input::{Loaded, load_any};
 use crate::output;
-use crate::report::{capital, effect, figure, parameter, percent};
+use crate::report::{capital, effect, figure, parameter, percent, servo_answer, with_unit};
 use anyhow::{Context, Result, bail};
 use gapscope_servo::schema::{Diagnosis, Estimate, Evaluation, Parameter};
 use gapscope_servo::{Given, Outcome, diagnose, evaluate};
@@ -125,7 +125,7 @@ fn page_of(out: &Path, machine: &Machine) -> PathBuf {
 fn try_out(folder: &Path, machine: &Machine, learnt: &[&str], tried: &[&str]) -> Result<Tried> {
     let read = |logs: &[&str]| -> Result<Loaded> {
         let logs = logs.iter().map(|log| folder.join(format!("{log}.csv.gz"))).collect();
-        load(&Input { robot: folder.join("robot.urdf"), logs, ..Input::default() })
+        load_any(&Input { robot: folder.join("robot.urdf"), logs, ..Input::default() }, None, &|_| {})
     };
     let (own, other) = (read(learnt)?, read(tried)?);
     let joints: Vec<String> = own.model.joints().iter().map(|joint| joint.name.clone()).collect();
@@ -179,10 +179,11 @@ fn markdown(machine: &Machine, tried: &[Tried]) -> String {
         let drive = if machine.drive.is_empty() { "" } else { " --drive servo.toml" };
         let _ = writeln!(
             text,
-            "## Identified on {}\n\n```\ngapscope diagnose {}/robot.urdf {}{drive}\n```\n\n{}",
+            "## Identified on {}\n\n```\ngapscope diagnose {}/robot.urdf {}{drive}\n```\n\n{}\n\n{}",
             learnt.join(", "),
             machine.set,
             logs.join(" "),
+            servo_answer(&one.outcome.diagnosis).map(|sentence| format!("> {sentence}")).join("\n>\n"),
             found(&one.outcome.diagnosis)
         );
         let _ = writeln!(text, "| joint tried on the others | before, mrad | after, mrad |\n|---|--:|--:|");
@@ -226,16 +227,13 @@ fn found(diagnosis: &Diagnosis) -> String {
     for ((kind, name, joint), e) in numbers(diagnosis) {
         let what = if kind == "drive" { "drive".to_owned() } else { effect(&kind) };
         let end = |end: Option<f64>| end.map_or("open".to_owned(), figure);
+        let interval = match e.ci95 {
+            [None, None] => "–".to_owned(),
+            [low, high] => format!("{} to {}", end(low), end(high)),
+        };
         let told = if e.determined { "yes" } else { "no" };
-        let _ = writeln!(
-            text,
-            "| {what} | {joint} | {} | {} {} | {} to {} | {told} |",
-            parameter(&name),
-            figure(e.value),
-            e.unit,
-            end(e.ci95[0]),
-            end(e.ci95[1])
-        );
+        let value = with_unit(&figure(e.value), &e.unit);
+        let _ = writeln!(text, "| {what} | {joint} | {} | {value} | {interval} | {told} |", parameter(&name));
     }
     text.push('\n');
     for one in &diagnosis.effects {

@@ -2,6 +2,7 @@
 
 use super::{EFFECTS, SUMS, rest};
 use crate::report::clause::combination;
+use crate::report::effort::Effort;
 use crate::report::plain::together;
 use crate::report::terminal::{INDENT, Paint, clean, column, name as padded};
 use crate::report::{
@@ -31,20 +32,21 @@ pub fn of(diagnosis: &Diagnosis, paint: &Paint) -> Vec<String> {
         })
     };
     let alone = ["alone shrinks the gap by", "alone grows the gap by"];
-    rows(&together(diagnosis), &diagnosis.joints, alone, &sums, paint)
+    let effort = Effort::of(&diagnosis.gap.regimes);
+    rows(&together(diagnosis), (&diagnosis.joints, effort), alone, &sums, paint)
 }
 
 /// One effect a row, its parameters behind it or, where these are too wide, below. The words before a shrink and a growth say
 /// how it comes about; `instead` has what stands in the place of an effect's parameters, if anything does.
 pub fn rows(
     effects: &[FoundEffect],
-    all: &[String],
+    (all, effort): (&[String], Effort),
     [shrinks, grows]: [&str; 2],
     instead: &dyn Fn(&FoundEffect) -> Option<Vec<String>>,
     paint: &Paint,
 ) -> Vec<String> {
     let shown = &effects[..effects.len().min(EFFECTS)];
-    let names: Vec<String> = shown.iter().map(|e| capital(&effect(&e.kind))).collect();
+    let names: Vec<String> = shown.iter().map(|e| effort.say(&capital(&effect(&e.kind)))).collect();
     let places: Vec<String> = shown.iter().map(|e| joint_list(&e.joints, all)).collect();
     let first = column(names.iter().map(String::as_str), 28);
     // A place too long for the column takes a line with the name; what is known of the effect goes below.
@@ -64,7 +66,8 @@ pub fn rows(
         let details = match instead(found) {
             Some(lines) => lines,
             None => {
-                let values = found.parameters.iter().filter_map(|(name, p)| value(&found.kind, name, p));
+                let values =
+                    found.parameters.iter().filter_map(|(name, p)| Some(effort.say(&value(&found.kind, name, p)?)));
                 Some(values.collect::<Vec<_>>().join("; ")).filter(|text| !text.is_empty()).into_iter().collect()
             }
         };

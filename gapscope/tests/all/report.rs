@@ -79,6 +79,32 @@ fn the_next_experiment_plays_on_the_robot() {
 }
 
 #[test]
+fn the_next_experiment_of_a_servo_arm_plays_too() {
+    let dir = servo_arm();
+    // An arm that trembles tells nothing: the answer is a motion to send.
+    let log = std::fs::read_to_string(dir.path().join("log.csv")).unwrap();
+    let mut lines = log.lines();
+    let (head, row) = (lines.next().unwrap(), lines.next().unwrap());
+    let row: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
+    let still: String = (0..300)
+        .map(|k| {
+            let (t, tremble) = (0.01 * f64::from(k), 0.0045 * (0.05 * f64::from(k)).sin());
+            let [_, a, b, c, d] = row[..] else { panic!("time, two positions, two set points") };
+            format!("{t:.2},{:.5},{:.5},{c},{d}\n", a + tremble, b + tremble)
+        })
+        .collect();
+    std::fs::write(dir.path().join("still.csv"), format!("{head}\n{still}")).unwrap();
+    let output = gapscope(dir.path(), ["diagnose", "robot.urdf", "still.csv", "--out", "still"]);
+    let told = said(&output);
+    assert!(output.status.success() && told.contains("Next     Send next_experiment.csv as set points"), "{told}");
+    assert!(dir.path().join("still/next_experiment.csv").is_file());
+    let file = dir.path().join("still/report.html");
+    let page = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(page.matches("data-play=\"next\"").count(), 2, "beside the robot and beside the words");
+    look(&[&file], &[]);
+}
+
+#[test]
 fn the_answer_alone_is_three_sentences_and_json_is_json() {
     let dir = pendulum();
     let quiet = gapscope(dir.path(), ["diagnose", "robot.urdf", "log.csv", "--out", "out", "--quiet"]);

@@ -34,6 +34,11 @@ impl Scene {
         self
     }
 
+    /// Whether the next experiment can be played.
+    pub fn plays_next(&self) -> bool {
+        self.plays.iter().any(|play| play.name == NEXT)
+    }
+
     /// Adds a motion that the robot is to follow.
     pub fn with_motion(mut self, model: &Model, trajectory: &Trajectory) -> Scene {
         self.plays.extend(motion(&Skeleton::of(model), trajectory));

@@ -69,6 +69,7 @@ if (scene && skeleton) {
   const links = skeleton.querySelectorAll(".links line");
   const groups = skeleton.querySelectorAll(".joint");
   const numbers = skeleton.querySelectorAll(".labels text");
+  const leaders = skeleton.querySelectorAll(".labels .leader");
   // As in skeleton.rs.
   const BESIDE = [[0.05, -0.04], [-0.11, -0.04], [0.05, 0.1], [-0.11, 0.1], [0.18, 0.03], [-0.24, 0.03], [0.05, -0.18], [-0.11, -0.18]];
   const APART = [0.12, 0.12];
@@ -91,6 +92,9 @@ if (scene && skeleton) {
       placed.push(place);
       text.setAttribute("x", place[0].toFixed(3));
       text.setAttribute("y", place[1].toFixed(3));
+      const right = place[0] > x, far = Math.abs(place[0] - x) > (right ? 0.06 : 0.12) || Math.abs(place[1] - y) > 0.11;
+      const ends = { x1: x, y1: y, x2: far ? place[0] + (right ? -0.02 : 0.08) : x, y2: far ? place[1] - 0.02 : y };
+      Object.entries(ends).forEach(([name, value]) => leaders[j].setAttribute(name, value.toFixed(3)));
     });
     const ring = [];
     for (let k = 0; k <= 48; k++) {

@@ -1,14 +1,16 @@
 //! The answer on a servo arm in three sentences: what it is, how far it shrinks, what to beware of.
 
+use super::super::effort::Effort;
 use super::super::format::{figure, percent};
-use super::super::plain;
+use super::super::{plain, words};
 use super::schema;
 use gapscope_diagnosis::schema::Verdict;
-use gapscope_servo::schema::Diagnosis;
+use gapscope_servo::schema::{Diagnosis, Regime};
 
 /// One line each; terminal and page begin with these very words.
 pub fn answer(diagnosis: &Diagnosis) -> [String; 3] {
-    [cause(diagnosis), reach(diagnosis), caution(diagnosis)]
+    let effort = Effort::of(&schema::regimes(&diagnosis.gap.regimes));
+    [cause(diagnosis), reach(diagnosis), caution(diagnosis)].map(|line| effort.say(&line))
 }
 
 fn cause(diagnosis: &Diagnosis) -> String {
@@ -32,16 +34,17 @@ pub fn nominal(diagnosis: &Diagnosis) -> &'static str {
 fn reach(diagnosis: &Diagnosis) -> String {
     let change = &diagnosis.shrink.position;
     let nominal = nominal(diagnosis);
+    let unit = unit(&diagnosis.gap.regimes, None);
     match (change.before, change.after) {
         (Some(before), Some(after)) => format!(
             "Run free under its set points, the arm found here is off by {}; {nominal} is off by {}.",
-            angle(after, before),
-            angle(before, after)
+            offset(after, before, unit),
+            offset(before, after, unit)
         ),
         (Some(before), None) => {
             format!(
                 "The arm found here cannot be run free on these logs; {nominal} is off by {}.",
-                angle(before, before)
+                offset(before, before, unit)
             )
         }
         _ => "No arm can be run free on these logs.".into(),
@@ -61,14 +64,31 @@ fn caution(diagnosis: &Diagnosis) -> String {
         left if left > 0.0005 => format!("{} of the squared gap", percent(left)),
         _ => "nothing".into(),
     };
-    format!("The gap is largest at {joint}, {} rms; {left} stays unexplained.", angle(*rms, *rms))
+    format!(
+        "The gap is largest at {joint}, {} rms; {left} stays unexplained.",
+        offset(*rms, *rms, unit(&diagnosis.gap.regimes, Some(joint)))
+    )
 }
 
-/// An error of position, rad, in the unit that suits the larger of the two that are told together.
-pub fn angle(value: f64, beside: f64) -> String {
+/// An error of position, in thousandths or whole ones of `unit` as suits the larger of the two that are told together.
+///
+/// The unit is one of [`words::motion_unit`]: over joints that turn and joints that slide it names both.
+pub fn offset(value: f64, beside: f64, unit: &str) -> String {
     // What would print as a thousand is a whole one.
-    let (scale, unit) = if value.max(beside) < 0.9995 { (1e3, "mrad") } else { (1.0, "rad") };
-    format!("{}\u{a0}{unit}", figure(scale * value))
+    let small = value.max(beside) < 0.9995;
+    let units: Vec<String> =
+        unit.split(", ").map(|unit| if small { format!("m{unit}") } else { unit.into() }).collect();
+    format!("{}\u{a0}{}", figure(if small { 1e3 * value } else { value }), units.join("\u{a0}or\u{a0}"))
+}
+
+/// Unit of the positions of a servo arm: of one joint, or of all together.
+pub fn unit(regimes: &[Regime], joint: Option<&str>) -> &'static str {
+    let regimes = schema::regimes(regimes);
+    match joint {
+        Some(joint) if words::implied_unit(joint, &regimes) == "N" => "m",
+        Some(_) => "rad",
+        None => words::motion_unit(&regimes, false),
+    }
 }
 
 #[cfg(test)]
@@ -119,14 +139,15 @@ mod tests {
     fn the_answer_says_what_how_far_and_where() {
         let [cause, reach, caution] = answer(&arm("coulomb_friction", "coulomb", 0.2, "N m"));
         assert_eq!(cause, "elbow rubs: 0.200\u{a0}N\u{a0}m of dry friction that the model lacks.");
-        assert_eq!(angle(0.0917, 1.0), "0.0917\u{a0}rad");
+        assert_eq!(offset(0.0917, 1.0, "rad"), "0.0917\u{a0}rad");
+        assert_eq!(offset(0.0917, 0.1, "rad, m"), "91.7\u{a0}mrad\u{a0}or\u{a0}mm");
         assert!(reach.contains("is off by 2.00\u{a0}mrad; the given servo is off by 40.0\u{a0}mrad"), "{reach}");
         assert_eq!(
             caution,
             "The gap is largest at elbow, 40.0\u{a0}mrad rms; 2\u{202f}% of the squared gap stays unexplained."
         );
         for (kind, parameter, said) in [
-            ("speed_limit", "limit", "elbow turns no faster than 0.200"),
+            ("speed_limit", "limit", "elbow moves no faster than 0.200"),
             ("servo_gain_error", "gain", "At elbow the servo pulls 0.200 times as hard as was given"),
             ("dead_band", "width", "At elbow the servo rests within 0.200"),
         ] {

@@ -1,7 +1,8 @@
 //! The diagnosis of a servo arm in the terms that the parts of the page share with one of torque.
 
 use gapscope_diagnosis::schema::{
-    Bounds, EffectCurve, EffectShrink, Estimate, FoundEffect, Parameter, Part, Quantity, Regime, Verdict, Why,
+    Bounds, EffectCurve, EffectShrink, Estimate, FoundEffect, NextExperiment, Parameter, Part, Quantity, Regime,
+    Verdict, Why,
 };
 use gapscope_servo::schema as servo;
 use std::collections::BTreeMap;
@@ -68,6 +69,11 @@ pub fn regimes(list: &[servo::Regime]) -> Vec<Regime> {
         samples: r.samples,
     };
     list.iter().map(regime).collect()
+}
+
+pub fn next_experiment(next: &servo::NextExperiment) -> NextExperiment {
+    let servo::NextExperiment { why, separates, motion, trajectory, separation } = next.clone();
+    NextExperiment { why, separates, motion, trajectory, separation }
 }
 
 pub fn why(list: &[servo::Why]) -> Vec<Why> {

@@ -1,6 +1,7 @@
 //! One page of documentation for one log.
 
 use super::published::{KnownFit, Log};
+use crate::report::effort::Effort;
 use crate::report::plain::answer;
 use crate::report::{
     NONE, Printed, capital, effect, estimate, figure, implied_unit, joint_list, motion_unit, outstanding, parameter,
@@ -66,7 +67,7 @@ pub fn markdown(log: &Log, outcome: &Outcome, others: &[Other], pictures: [Optio
         let _ = writeln!(text, "![What is left, by joint and regime]({picture})\n");
     }
     text.push_str("This page and its pictures are made by `gapscope study real-logs --data DIR --force`.\n");
-    text.replace('\u{202f}', "\u{a0}")
+    Effort::of(&diagnosis.gap.regimes).say(&text).replace('\u{202f}', "\u{a0}")
 }
 
 /// What the models explain of each joint's effort, beside what another program does.

@@ -59,14 +59,23 @@ pub fn run(args: &Generate) -> Result<String> {
     }
 
     let bar = bar(args.episodes);
-    logs.par_iter().enumerate().try_for_each(|(i, file)| -> Result<()> {
+    let new = !out.exists();
+    let written = logs.par_iter().enumerate().try_for_each(|(i, file)| -> Result<()> {
         let log = plan.episode(args.seed, i as u64)?;
         // Not before: what cannot be simulated leaves no folder behind.
         std::fs::create_dir_all(&out).with_context(|| format!("cannot make the folder {}", out.display()))?;
         write_csv(file, &log, args.force)?;
         bar.inc(1);
         Ok(())
-    })?;
+    });
+    if let Err(error) = written {
+        // Half a set of logs is none.
+        if new {
+            logs.iter().for_each(|file| drop(std::fs::remove_file(file)));
+            let _ = std::fs::remove_dir(&out);
+        }
+        return Err(error);
+    }
     output::write(&urdf_file, urdf)?;
     bar.finish_and_clear();
     let (robot, seed, episodes) = (model.name(), args.seed, args.episodes);

@@ -282,21 +282,21 @@ pub fn standstill(signals: &[Signals], joints: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Standard deviation of white noise on a smooth signal, from the lesser half of its fourth differences (1, −4, 6, −4, 1).
+/// Standard deviation of white noise on a smooth signal, from the lesser two thirds of its fourth differences (1, −4, 6, −4, 1).
 /// Of an encoder those are whole counts: their median would be one as well, and be off by up to a third. Where five samples
 /// are the same nothing moved.
 fn white_noise(x: &[f64]) -> f64 {
     let moved = |w: &&[f64]| w.iter().any(|x| *x != w[0]);
     let fourth = |w: &[f64]| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];
     let mut squares: Vec<f64> = x.windows(5).filter(moved).map(|w| fourth(w).powi(2)).collect();
-    let half = squares.len() / 2;
-    if half == 0 {
+    let lesser = 2 * squares.len() / 3;
+    if lesser == 0 {
         return 0.0;
     }
-    squares.select_nth_unstable_by(half, f64::total_cmp);
-    let mean = squares[..half].iter().sum::<f64>() / half as f64;
-    // 70 = Σ of the squared weights; 0.1426 = mean square of the lesser half of N(0, 1).
-    (mean / (0.1426 * 70.0)).sqrt()
+    squares.select_nth_unstable_by(lesser, f64::total_cmp);
+    let mean = squares[..lesser].iter().sum::<f64>() / lesser as f64;
+    // 70 = Σ of the squared weights; 0.2752 = mean square of the lesser two thirds of N(0, 1).
+    (mean / (0.2752 * 70.0)).sqrt()
 }
 
 #[cfg(test)]
@@ -318,6 +318,18 @@ mod tests {
             let (told, true_size) = (white_noise(&counts), step / 12f64.sqrt());
             assert!((told / true_size - 1.0).abs() < 0.08, "{step}: {told} for {true_size}");
         }
+    }
+
+    #[test]
+    fn no_rest_of_a_log_with_pushes_tells_of_friction() {
+        use crate::fit::support::{fitted, torque};
+        use gapscope_effects::Kind;
+        let (mut signals, ..) = fitted(Kind::ViscousFriction, torque(|_| 0.0));
+        let rests = |s: &Signals| s.rests(0, 0.5).into_iter().filter(|rests| *rests).count();
+        assert!(rests(&signals[0]) > 10 && rests(&signals[1]) > 10);
+        signals[0].pushed = vec![[1.0, 2.0]];
+        assert_eq!(rests(&signals[0]), 0);
+        assert!(rests(&signals[1]) > 10, "another log tells");
     }
 
     #[test]

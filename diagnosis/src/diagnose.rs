@@ -75,7 +75,7 @@ pub fn diagnose(
     logs.known = Known::new(model, &logs.signals, &logs.band, &logs.still, &logs.moving);
     let chosen = logs.choose(progress)?;
     progress("rivals", 0.55);
-    let rivals = chosen.held_against(rivals::rivals(&chosen.all, &chosen.choice));
+    let rivals = rivals::rivals(&chosen.all, &chosen.choice);
     logs.conclude(&chosen, &rivals, data, progress)
 }
 

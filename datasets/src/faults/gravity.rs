@@ -1,7 +1,6 @@
 //! Accounts of gravity: a robot that stands otherwise than its description.
 
 use super::motion::{Account, Kind, Scene};
-
 use glam::DVec3;
 
 /// Gravity on earth, m/s². A description may have another planet's, or another unit's; a robot stands on this one.

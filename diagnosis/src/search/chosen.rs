@@ -6,7 +6,6 @@ use crate::numbers::decide::PRICE_OF_ODD;
 use crate::record::data::Data;
 use crate::search::climb;
 use crate::search::climb::{Choice, Competition};
-use crate::search::rivals::Rival;
 use gapscope_effects::{Candidate, EffectError, Kind};
 
 /// What an account leaves: `[episode][joint][signal]`, N m or N.
@@ -69,18 +68,6 @@ impl Chosen {
     pub(crate) fn prior(&self) -> f64 {
         let drive = if self.turns() { PRICE_OF_ODD.get() + (self.noise.len() as f64).ln() } else { 0.0 };
         Competition::new(&self.all).prior(&self.choice.set) - drive
-    }
-
-    /// Its rivals, each that the first look holds likelier by as much as the logs speak against it at the exact law.
-    pub(crate) fn held_against(&self, mut rivals: Vec<Rival>) -> Vec<Rival> {
-        let likelier = |rival: &&mut Rival| rival.odds < 0.0 && !rival.without.is_calibration();
-        for rival in rivals.iter_mut().filter(likelier) {
-            if let Some((_, odds)) = self.needed.iter().find(|(kind, _)| *kind == rival.without) {
-                rival.by_logs += odds - rival.odds;
-                rival.odds = *odds;
-            }
-        }
-        rivals
     }
 
     /// The same with another choice among its candidates.

@@ -97,11 +97,11 @@ impl Record<'_> {
     /// robot is likelier in one more than something else is. In a first look a law that reads the torque found stands beside
     /// the torque of another account.
     fn spread(&self, chosen: &Chosen, kind: Kind, progress: Progress<'_>) -> Result<Option<Chosen>, EffectError> {
-        let entry = |c: &usize| &chosen.all.entries[*c].candidate;
-        let (own, rest): (Vec<usize>, Vec<usize>) = chosen.choice.set.iter().partition(|c| entry(c).kind == kind);
         if kind.is_calibration() {
             return Ok(None);
         }
+        let entry = |c: &usize| &chosen.all.entries[*c].candidate;
+        let (own, rest): (Vec<usize>, Vec<usize>) = chosen.choice.set.iter().partition(|c| entry(c).kind == kind);
         for other in climb::kinds(&chosen.all, &rest) {
             if other.is_calibration() || other.is_outside() || !other.card().reads_found {
                 continue;

@@ -27,9 +27,9 @@ impl Record<'_> {
             let beside = (0..entries.len()).filter(|&i| !entries[i].candidate.kind.card().rotor).collect();
             (of.exact.clone(), Fit { set: beside, ..of.fit.clone() })
         };
-        let restless = |beside: &(Problem, Fit)| self.restless(&rigid.noise, beside);
+        let restless = |exact: &Problem, fit: &Fit| self.restless(&rigid.noise, exact, fit);
         // What was found beyond calibration may stand in for a drive: beside calibration alone more is left.
-        let joints = restless(&(rigid.exact.clone(), rigid.fit.clone()))?;
+        let joints = restless(&rigid.exact, &rigid.fit)?;
         let mut bases = vec![(without_rotors(&rigid), rigid.choice.clone(), joints, false)];
         if climb::kinds(&rigid.all, &rigid.choice.set).into_iter().any(|kind| !kind.is_calibration()) {
             let calibration = |c: &&Candidate| c.kind.is_calibration() && !c.kind.card().rotor;
@@ -41,10 +41,10 @@ impl Record<'_> {
             let has_rotor = calibrated.exact.entries.iter().any(|e| e.candidate.kind.card().rotor);
             if has_rotor || calibrated.choice.set != choice.set {
                 let anew = self.data(&rigid.noise).refine(&bodies)?;
-                let joints = restless(&anew)?;
+                let joints = restless(&anew.0, &anew.1)?;
                 bases.push((anew, choice, joints, false));
             }
-            let joints = restless(&(calibrated.exact.clone(), calibrated.fit.clone()))?;
+            let joints = restless(&calibrated.exact, &calibrated.fit)?;
             bases.push((without_rotors(&calibrated), calibrated.choice, joints, false));
         }
         let any = |j: &usize| bases.iter().any(|(_, _, joints, _)| joints.contains(j));
@@ -130,7 +130,7 @@ impl Record<'_> {
     }
 
     /// Joints of which a fit leaves more than noise, those with most of it first.
-    fn restless(&self, noise: &[f64], (exact, fit): &(Problem, Fit)) -> Result<Vec<usize>, EffectError> {
+    fn restless(&self, noise: &[f64], exact: &Problem, fit: &Fit) -> Result<Vec<usize>, EffectError> {
         let rest = self.data(noise).rest(exact, fit)?;
         let floor = noise_floor(&self.signals, &self.band, &rest, self.model.dof());
         // Play shows for moments alone: what it leaves then counts in full.

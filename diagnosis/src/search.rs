@@ -7,6 +7,7 @@ pub mod contact;
 pub mod converge;
 pub mod drive;
 pub mod first;
+pub mod held_back;
 pub mod late;
 pub mod limits;
 pub mod needed;

@@ -12,6 +12,7 @@ impl Record<'_> {
         let chosen = self.drive(chosen, progress)?;
         let chosen = self.likeliest(chosen, progress)?;
         let chosen = self.needed(self.shown(chosen, progress)?, progress)?;
+        let chosen = self.held_back(chosen)?;
         let mut chosen = self.delay_or_lag(self.sticking(chosen)?)?;
         // What it is held against is to be around what was chosen in the end.
         let Chosen { all, choice, exact, fit, noise, .. } = &mut chosen;

@@ -2,7 +2,7 @@
 
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
-use crate::numbers::decide::PRICE_OF_ODD;
+use crate::numbers::decide::{PRICE_OF_ODD, TWENTY_TO_ONE};
 use crate::record::data::Data;
 use crate::search::climb;
 use crate::search::climb::{Choice, Competition};
@@ -94,7 +94,7 @@ impl Chosen {
     pub(crate) fn concerns_beside(&self, other: &Chosen) -> bool {
         let farther = self.exact.far(&self.fit) - other.exact.far(&other.fit);
         climb::is_material(&self.exact, &other.exact.left(&other.fit), &self.exact.left(&self.fit))
-            || farther >= PRICE_OF_ODD.get()
+            || farther >= TWENTY_TO_ONE.get()
     }
 
     /// Whether a drive turns on its own, and has the rotor that does.

@@ -29,8 +29,13 @@ pub struct Choice {
 
 /// Whether some joint is left less by as much as concerns anyone: mean squares of what two accounts leave of each, (N m)² or N².
 pub fn is_material(problem: &Problem, without: &[f64], with: &[f64]) -> bool {
-    let moved = |j: usize| without[j] - with[j] > (EXACT_TO.get() * problem.scale[j]).powi(2);
-    (0..with.len()).any(moved)
+    !less_is_left(problem, without, with).is_empty()
+}
+
+/// The joints of which one account leaves less than another by as much as concerns anyone.
+pub fn less_is_left(problem: &Problem, without: &[f64], with: &[f64]) -> Vec<usize> {
+    let moved = |j: &usize| without[*j] - with[*j] > (EXACT_TO.get() * problem.scale[*j]).powi(2);
+    (0..with.len()).filter(moved).collect()
 }
 
 /// Kinds in a set, ascending.
@@ -154,7 +159,7 @@ impl<'a> Competition<'a> {
             let rest = self.without(&set, |c| self.kind(c) == kind);
             let Some(without) = score.solve(&self.problem.columns(&rest)) else { continue };
             let moves = is_material(self.problem, &score.left_by(&without), &left);
-            if !moves && without.far() - with.far() < PRICE_OF_ODD.get() {
+            if !moves && without.far() - with.far() < TWENTY_TO_ONE.get() {
                 set = rest;
             }
         }

@@ -24,7 +24,7 @@ use crate::record::floor::noise_floor;
 use crate::record::logs::Record;
 use crate::record::rows;
 use crate::record::signals::{Signals, derivative_kernel};
-use gapscope_effects::{Candidate, EffectError, EncoderSide, JointRun, Kind, Turning};
+use gapscope_effects::{Candidate, EffectError, EncoderSide, JointRun, Kind, Place, Turning};
 use nalgebra::{Matrix2, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -32,6 +32,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Rotors that are tried first with each, as parts of the inertia that they turn.
 const ROTOR: [f64; 7] = [0.1, 0.2, 0.33, 0.5, 0.7, 1.0, 1.4];
@@ -63,6 +64,10 @@ struct Study<'a> {
     noisier: Vec<JointRun>,
     /// Samples of each episode at which the joint slides: at rest friction holds what nobody knows.
     slides: Vec<Vec<bool>>,
+    /// What calibration of the joint's own is linear in beside its rotor, `[episode][column][sample]`: friction and bias.
+    calibration: Vec<Vec<Vec<f64>>>,
+    /// Directions of length one that it spans at the rows of the band, in each view that was asked for.
+    spans: Mutex<Vec<(View, Span)>>,
     /// Inertia of the robot about the joint, kg m² (kg).
     inertia: f64,
     /// Rotor with which a rigid drive leaves least, kg m² (kg).
@@ -74,6 +79,9 @@ struct Study<'a> {
     /// Whether springs are held against a rigid drive through a filter, and nothing else is tried.
     through: bool,
 }
+
+/// Orthogonal directions of length one.
+type Span = Arc<Vec<Vec<f64>>>;
 
 /// Runs as they were logged, or with some noise more.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -154,6 +162,8 @@ impl<'a> Study<'a> {
             runs,
             noisier: Vec::new(),
             slides: logs.signals.iter().map(|s| s.slides(joint, logs.still[joint])).collect(),
+            calibration: logs.signals.iter().map(|s| calibration(logs, s, joint)).collect(),
+            spans: Mutex::default(),
             inertia,
             rotor: 0.0,
             unnoticed: 0.0,
@@ -302,6 +312,18 @@ impl<'a> Study<'a> {
         }
         (drive, rotor)
     }
+}
+
+/// The columns of a joint's own calibration along a log, its rotor aside: friction and bias.
+fn calibration(logs: &Record<'_>, s: &Signals, joint: usize) -> Vec<Vec<f64>> {
+    let motion = s.motion(logs.model, &logs.still);
+    let of_joint = |kind: &Kind| {
+        let card = kind.card();
+        kind.is_calibration() && !card.rotor && !card.body && card.place == Place::Joint
+    };
+    let columns =
+        Kind::ALL.into_iter().filter(of_joint).flat_map(|kind| Candidate::new(kind, vec![joint]).columns(&motion));
+    columns.flat_map(|column| column.rows).filter(|(row, _)| *row == joint).map(|(_, x)| x).collect()
 }
 
 /// The kinds whose motor turns on its own, and how.

@@ -138,6 +138,7 @@ impl Record<'_> {
                 candidate.kind == kind && !candidate.turns() && !is_link && !kind.is_outside()
             };
             // The one that shows least goes first: of two that stand for each other, each holds nothing beside the other.
+            let mut needed: Vec<usize> = Vec::new();
             loop {
                 let own: Vec<usize> = (0..chosen.exact.entries.len()).filter(|&i| of_kind(&chosen, i)).collect();
                 let halves = chosen.fit.half_widths(&chosen.exact, &own, &speeds);
@@ -146,13 +147,20 @@ impl Record<'_> {
                     let parts = theta.iter().zip(half).map(|(theta, half)| theta.abs() / half);
                     (i, parts.fold(0.0, f64::max))
                 };
-                let least = own.iter().zip(halves).map(shows).min_by(|a, b| a.1.total_cmp(&b.1));
+                let open = |(i, _): &(usize, f64)| !needed.contains(&chosen.choice.set[*i]);
+                let least = own.iter().zip(halves).map(shows).filter(open).min_by(|a, b| a.1.total_cmp(&b.1));
                 let Some((gone, _)) = least.filter(|(_, shows)| *shows < 1.0) else { break };
                 let mut set = chosen.choice.set.clone();
-                set.remove(gone);
+                let candidate = set.remove(gone);
                 if own.len() > 1 {
                     let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
-                    chosen = chosen.with(Choice { set }, exact, fit);
+                    let without = chosen.with(Choice { set }, exact, fit);
+                    // What bodies could stand for has a wide interval, though they would have to be what they hardly can.
+                    if chosen.odds_against(&without, self)? > 0.0 {
+                        needed.push(candidate);
+                    } else {
+                        chosen = without;
+                    }
                     continue;
                 }
                 let mut all = chosen.all.clone();

@@ -4,7 +4,7 @@
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 7.2.2;
 //! physical consistency: Wensing, Kim, Slotine, IEEE RA-L 3(1) 2018.
 
-use crate::card::{Apart, Card, Place, Size};
+use crate::card::{Apart, Card, Grid, Knob, Place, Size, Turned};
 use crate::law::{Law, Listed, Signature, Value, check};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
 use gapscope_dynamics::{Data, Inertia, InertialSource, Model};
@@ -74,6 +74,12 @@ impl Signature for Payload {
         words: "payload",
         meaning: "a body at the flange that the model does not carry",
         place: Place::Leaf,
+        // All ten numbers are small where the mass is: what is plausible of them hangs on what is carried.
+        knob: Some(Knob {
+            what: "plausible mass, part of the robot's",
+            grid: Grid::Fixed(|| PLAUSIBLE.to_vec()),
+            turned: Turned::Not,
+        }),
         size: Size::PointMass("mass"),
         apart: Apart::By(1, "log without the load, or weigh it"),
         bends: true,
@@ -88,7 +94,7 @@ impl Signature for Payload {
     }
 
     fn scales(candidate: &Candidate, model: &Model) -> Option<Vec<f64>> {
-        candidate.joint().map(|j| scales(model, j))
+        candidate.joint().map(|j| scales(model, j, if candidate.shape > 0.0 { candidate.shape } else { PLAUSIBLE[0] }))
     }
 }
 
@@ -130,8 +136,8 @@ pub(super) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
     columns
 }
 
-/// Mass of a plausible payload, as a part of the robot's: a standard deviation, ...
-const MASS: f64 = 0.2;
+/// Mass of a plausible payload, as a part of the robot's: standard deviations, of a load and of a light tool, ...
+const PLAUSIBLE: [f64; 2] = [0.2, 0.05];
 /// ... and where it is held, m from the last link's origin.
 const LEVER: f64 = 0.15;
 
@@ -139,12 +145,12 @@ const LEVER: f64 = 0.15;
 const ON_A_SCALE: f64 = 0.007;
 
 /// Plausible sizes of the ten coefficients, standard deviations about no payload: kg, kg m, kg m².
-fn scales(model: &Model, joint: usize) -> Vec<f64> {
+fn scales(model: &Model, joint: usize, part: f64) -> Vec<f64> {
     let all: f64 = model.joints().iter().map(|j| j.inertia.mass).sum();
     // What was on the scale carries nothing more.
     let mass = match model.inertial_source(joint) {
         InertialSource::MassKnown => ON_A_SCALE * model.joints()[joint].inertia.mass,
-        _ => MASS * all,
+        _ => part * all,
     };
     [&[mass][..], &[mass * LEVER; 3], &[mass * LEVER * LEVER; 6]].concat()
 }

@@ -95,6 +95,11 @@ impl Problem {
         self.joints.iter().map(|joint| mean_square(joint.residual(&fit.columns, &fit.theta))).collect()
     }
 
+    /// The same of a fit of the same columns whose links need not be bodies.
+    pub fn free_left(&self, fit: &Fit) -> Vec<f64> {
+        self.left(&Fit { theta: self.solve_unbounded(&fit.columns, &self.total), ..fit.clone() })
+    }
+
     /// Sum over the joints of the mean logarithm of what a fit leaves of each block of time, each joint by its rows: a burst
     /// that no law of the catalogue hits counts as one block that is off.
     pub fn misfit(&self, fit: &Fit, band: &Band) -> f64 {

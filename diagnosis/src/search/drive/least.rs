@@ -106,7 +106,8 @@ impl Study<'_> {
             }
             let heavier = self.at_rows(view, |e| self.run(of, e).acceleration.clone());
             let part = dot(&own, &heavier) / dot(&heavier, &heavier).max(f64::MIN_POSITIVE);
-            own.iter().zip(&heavier).map(|(own, heavier)| own - part * heavier).collect()
+            let own = own.iter().zip(&heavier).map(|(own, heavier)| own - part * heavier).collect();
+            self.beside_calibration(view, vec![own]).remove(0)
         };
         let own = difference(Runs::Logged);
         let noisier = difference(Runs::Noisier);

@@ -3,6 +3,9 @@
 use super::*;
 use crate::numbers::decide::{BLOCK_OF_NOISE, LIGHTEST_ROTOR, NOT_RIGID_LEAVES};
 
+/// Part of the square of a column below which what others leave of it is rounding.
+const OWN_PART: f64 = 1e-6;
+
 impl Study<'_> {
     /// What a drive leaves at the rows of the band; nothing of the episodes that are not looked at.
     pub(super) fn rows(&self, drive: &Candidate, rotor: f64, view: View) -> Vec<f64> {
@@ -15,7 +18,40 @@ impl Study<'_> {
             .flat_map(|&(of, drive, rotor)| self.episodes(view).map(move |e| (self.run(of, e), drive, rotor)))
             .collect();
         let mut left = JointRun::left_by_each(&all).into_iter();
-        asked.iter().map(|_| self.at_rows(view, |_| left.next().unwrap_or_default())).collect()
+        let rows = asked.iter().map(|_| self.at_rows(view, |_| left.next().unwrap_or_default())).collect();
+        self.beside_calibration(view, rows)
+    }
+
+    /// Rows less what friction and bias of the joint could take of them: beside a drive they are others than beside a rigid one,
+    /// and what they are beside that hides the drive.
+    pub(super) fn beside_calibration(&self, view: View, mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let span = self.span(view);
+        for rows in &mut rows {
+            span.iter().for_each(|unit| less_along(rows, unit));
+        }
+        rows
+    }
+
+    /// What friction and bias of the joint span at the rows of the band.
+    fn span(&self, view: View) -> Span {
+        let known = || self.spans.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, span)) = known().iter().find(|(of, _)| *of == view) {
+            return span.clone();
+        }
+        let mut span: Vec<Vec<f64>> = Vec::new();
+        for c in 0..self.calibration.first().map_or(0, Vec::len) {
+            let mut column = self.at_rows(view, |e| self.calibration[e][c].clone());
+            let whole = dot(&column, &column);
+            span.iter().for_each(|unit| less_along(&mut column, unit));
+            let own = dot(&column, &column);
+            if own > OWN_PART * whole {
+                column.iter_mut().for_each(|x| *x /= own.sqrt());
+                span.push(column);
+            }
+        }
+        let span = Arc::new(span);
+        known().push((view, span.clone()));
+        span
     }
 
     pub(super) fn run(&self, of: Runs, episode: usize) -> &JointRun {
@@ -265,6 +301,12 @@ pub(super) fn noisier(s: &Signals, run: &JointRun, position: f64, effort: f64, s
         noisier.rest[k] += effort - run.inertia[k] * acceleration;
     }
     noisier
+}
+
+/// Takes off a signal what of it lies along another of length one.
+fn less_along(x: &mut [f64], unit: &[f64]) {
+    let part = dot(x, unit);
+    x.iter_mut().zip(unit).for_each(|(x, unit)| *x -= part * unit);
 }
 
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -2,14 +2,16 @@
 
 use crate::cli::Input;
 use crate::input::{Reading, fault_line, load_any, options, read};
+use crate::report::effort::Effort;
 use crate::report::terminal::{column, fill, pad};
-use crate::report::{count, figure, percent, plain};
+use crate::report::{count, figure, percent, plain, with_unit};
 use crate::{output, robot};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use gapscope_datasets::{
     Bound, Doubt, Episode, Fault, LogTraits, ReadOptions, determined, inspect, joints_of, suggest_map,
 };
+use gapscope_dynamics::{JointKind, Model};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -67,6 +69,9 @@ pub struct Inspection {
     pub findings: Vec<String>,
     /// Which parameters the logs determine, by joint; empty without a robot.
     pub determined: BTreeMap<String, Vec<&'static str>>,
+    /// Units of each joint's position and effort, for the lines; empty without a robot, as a log does not say what slides.
+    #[serde(skip)]
+    pub units: BTreeMap<String, [&'static str; 2]>,
 }
 
 /// Inspects; returns what to print.
@@ -133,7 +138,8 @@ pub fn inspected(input: &Input) -> Result<Inspection> {
         let (episodes, notes) = read(input, &joints, &options, &|_| {})?;
         let findings = notes.iter().map(ToString::to_string).collect();
         let logs = inspect(&episodes);
-        return Ok(Inspection { schema, logs, faults: vec![], doubts: vec![], findings, determined: BTreeMap::new() });
+        let (determined, units) = (BTreeMap::new(), BTreeMap::new());
+        return Ok(Inspection { schema, logs, faults: vec![], doubts: vec![], findings, determined, units });
     }
     let loaded = load_any(input, Some(Bound::DIAGNOSIS), &|_| {})?;
     let names = loaded.model.joints().iter().map(|joint| joint.name.clone());
@@ -147,20 +153,29 @@ pub fn inspected(input: &Input) -> Result<Inspection> {
         schema,
         logs: inspect(&loaded.episodes),
         determined: told,
+        units: units(&loaded.model),
         faults: loaded.faults,
         doubts: loaded.doubts,
         findings: loaded.findings,
     })
 }
 
+fn units(model: &Model) -> BTreeMap<String, [&'static str; 2]> {
+    let of = |kind: JointKind| if kind == JointKind::Prismatic { ["m", "N"] } else { ["rad", "N m"] };
+    model.joints().iter().map(|joint| (joint.name.clone(), of(joint.kind))).collect()
+}
+
 /// The inspection in lines.
 pub fn text(inspection: &Inspection) -> String {
+    // What a whole robot is told in; a joint's own lines have its own word.
+    let whole = Effort::of_units(inspection.units.values().map(|[_, effort]| *effort));
+    let own = |joint: &str| inspection.units.get(joint).copied().unwrap_or_default();
     let mut text = String::new();
     for fault in &inspection.faults {
-        let _ = writeln!(text, "Fault: {}", fault_line(fault));
+        let _ = writeln!(text, "Fault: {}", whole.say(&fault_line(fault)));
     }
     for doubt in &inspection.doubts {
-        let _ = writeln!(text, "In doubt: {}", doubt.question);
+        let _ = writeln!(text, "In doubt: {}", whole.say(&doubt.question));
     }
     if inspection.faults.iter().any(|fault| fault.mended) {
         text.push_str("What follows is of the mended logs.\n");
@@ -179,19 +194,23 @@ pub fn text(inspection: &Inspection) -> String {
         );
         let width = column(log.joints.iter().map(|joint| joint.name.as_str()), 28);
         for joint in &log.joints {
-            let step = joint.step.map_or(String::new(), |step| format!(", encoder step {}", figure(step)));
+            let [position, unit] = own(&joint.name);
+            let step = joint
+                .step
+                .map_or(String::new(), |step| format!(", encoder step {}", with_unit(&figure(step), position)));
             let still = if joint.moves { "" } else { ", stands still" };
             let glitches = if joint.glitches > 0 { format!(", {} jumps", joint.glitches) } else { String::new() };
             let effort = joint.effort.map_or(String::new(), |[low, high]| {
                 let held = percent(joint.effort_held.unwrap_or_default());
-                format!("; effort {} to {}, held {held}", figure(low), figure(high))
+                let word = if unit.is_empty() { "effort" } else { Effort::of_units([unit]).word() };
+                format!("; {word} {} to {}, held {held}", figure(low), with_unit(&figure(high), unit))
             });
             let _ = writeln!(
                 text,
                 "  {}  position {} to {}, speed {} rms, noise {}{step}{glitches}{still}{effort}",
                 pad(&joint.name, width),
                 fill(&figure(joint.position[0]), 7),
-                fill(&figure(joint.position[1]), 7),
+                with_unit(&fill(&figure(joint.position[1]), 7), position),
                 figure(joint.speed),
                 figure(joint.noise),
             );
@@ -201,11 +220,63 @@ pub fn text(inspection: &Inspection) -> String {
         text.push_str("\nDetermined by these logs, beside all else:\n");
         for (joint, parameters) in &inspection.determined {
             let parameters = if parameters.is_empty() { "nothing".to_owned() } else { parameters.join(", ") };
-            let _ = writeln!(text, "  {joint}: {}", parameters.replace('_', " "));
+            let word = Effort::of_units([own(joint)[1]]);
+            let _ = writeln!(text, "  {joint}: {}", word.say(&parameters.replace('_', " ")));
         }
     }
     for finding in &inspection.findings {
-        let _ = writeln!(text, "Note: {finding}");
+        let _ = writeln!(text, "Note: {}", whole.say(finding));
     }
-    text.chars().map(|c| if c.is_control() && c != '\n' { ' ' } else { c }).collect()
+    // What is pasted and searched has ordinary spaces.
+    text.replace('\u{a0}', " ").chars().map(|c| if c.is_control() && c != '\n' { ' ' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An inspection of one joint that slides, `x`, and one that turns, `a`.
+    fn inspection() -> Inspection {
+        let episode = Episode {
+            name: "log.csv".into(),
+            joints: vec!["x".into(), "a".into()],
+            time: (0..100).map(|k| 0.01 * f64::from(k)).collect(),
+            position: vec![(0..100).map(|k| (0.1 * f64::from(k)).sin()).collect(); 2],
+            effort: vec![(0..100).map(|k| (0.1 * f64::from(k)).cos()).collect(); 2],
+            ..Episode::default()
+        };
+        let told = |joint: &str| (joint.to_owned(), vec!["torque_bias", "torque_gain_error"]);
+        Inspection {
+            schema: "gapscope.inspection/1",
+            logs: inspect(&[episode]),
+            faults: vec![],
+            doubts: vec![],
+            findings: vec!["the torque of torque.csv".into()],
+            determined: BTreeMap::from([told("x"), told("a")]),
+            units: BTreeMap::from([("x".into(), ["m", "N"]), ("a".into(), ["rad", "N m"])]),
+        }
+    }
+
+    #[test]
+    fn a_joint_that_slides_is_told_in_force() {
+        let said = text(&inspection());
+        for part in [
+            "  x: force bias, force gain error",
+            "  a: torque bias, torque gain error",
+            // What is of both has the common word; names of files stay.
+            "Note: the effort of torque.csv",
+            "; force −",
+            " N, held",
+            "; torque −",
+            " N m, held",
+        ] {
+            assert!(said.contains(part), "{part}\n{said}");
+        }
+        // Without a robot nobody knows what slides.
+        let said = text(&Inspection { units: BTreeMap::new(), determined: BTreeMap::new(), ..inspection() });
+        assert!(
+            said.contains("; effort −") && !said.contains(" N") && said.contains("the torque of torque.csv"),
+            "{said}"
+        );
+    }
 }

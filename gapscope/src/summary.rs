@@ -9,9 +9,9 @@ use crate::report::effort::Effort;
 use crate::report::plain;
 use crate::report::terminal::{INDENT, Paint, block, blocks, clean, column, fill, name as padded, pad, wrap};
 use crate::report::{
-    beside_the_answer, capital, changed, count, effect, effects, figure, headline, implied_unit, in_words, interval,
-    is_above_floor, joint_list, largest, list, motion_unit, outstanding, percent, percent_figure, plain as rounded,
-    power_line, regime, sentences, significant, verdict, with_unit, words_of_the_rest,
+    account, beside_the_answer, capital, changed, count, effect, effects, figure, headline, implied_unit, in_words,
+    interval, is_above_floor, joint_list, largest, list, motion_unit, outstanding, percent, percent_figure,
+    plain as rounded, power_line, regime, sentences, significant, verdict, with_unit, words_of_the_rest,
 };
 use change::Cells;
 use gapscope_datasets::{Doubt, Fault};
@@ -129,7 +129,7 @@ pub fn why(list: &[Why], joints: &[String], paint: &Paint) -> String {
     for Why { proposed, joints: at, against, odds, taken } in all {
         let odds = format!("{odds:+.1}").replace('-', "−");
         let place = if at.is_empty() { String::new() } else { format!(" at {}", joint_list(at, joints)) };
-        let text = clean(&format!("{}{place}, against {}", effect(proposed), in_words(against)));
+        let text = clean(&format!("{}{place}, against {}", effect(proposed), account(against)));
         // The kind in words; its public name stands in diagnosis.json.
         let before = format!("  {:5}  {}  ", if *taken { "taken" } else { "no" }, fill(&odds, 9));
         let columns = before.chars().count();

@@ -245,6 +245,10 @@ def use_contents(page):
     """Each link of the line of sections leads there, by pointer and by key, and the line stays in sight."""
     faults = []
     page.evaluate("scrollTo(0, 0)")
+    goes_on = "(() => { const b = document.querySelector('.contents'); return b && b.scrollWidth > b.clientWidth + 2; })()"
+    hint = "getComputedStyle(document.querySelector('.contents'), '::after').content"
+    if page.evaluate(goes_on) and "→" not in page.evaluate(hint):
+        faults.append("the line of links goes on without a hint")
     for i, link in enumerate(page.locator(".contents a").all()):
         place = link.get_attribute("href")
         if i % 2:
@@ -280,6 +284,9 @@ def use_index(page):
     rows = "[...document.querySelectorAll('#diagnoses tbody tr')].filter((r) => !r.hidden).map((r) => r.dataset.name).join('|')"
     faults = []
     before = page.evaluate(rows)
+    cut = "(() => { const h = document.querySelector('#diagnoses thead tr'); return h.scrollWidth > h.clientWidth + 1; })()"
+    if page.evaluate(cut):
+        faults.append("headings to sort by are cut")
     heads = page.locator("#diagnoses thead button")
     heads.nth(0).focus()
     page.keyboard.press("Enter")

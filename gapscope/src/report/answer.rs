@@ -107,7 +107,7 @@ fn how_far(diagnosis: &Diagnosis) -> String {
         if diagnosis.effects.len() == 1 { "With the effect in the model" } else { "With the effects in the model" };
     let rollout = diagnosis.shrink.rollout.last().and_then(|h| {
         Some(format!(
-            ", and the position error of {} s rollouts {}",
+            ", and the position error of {}\u{a0}s rollouts {}",
             plain(h.horizon),
             shrinks(h.change.shrink?, h.change.ci95)
         ))

@@ -21,6 +21,8 @@ const FIRST: usize = 12;
 const DOTS: usize = 700;
 /// Stretches that a law of many points is averaged over.
 const STRETCHES: usize = 160;
+/// A law whose values scatter within such a stretch by more than this part of all their spread is no line over the axis.
+const SCATTERED: f64 = 0.25;
 /// Dots of all curves together.
 const ALL_DOTS: usize = 40_000;
 
@@ -110,7 +112,11 @@ fn curve(curve: &EffectCurve, most: usize) -> Markup {
                 marks: html! {
                     (dots(data, &x, &y, "data"))
                     @if !curve.band.is_empty() { (band(&curve.band, &x, &y, "after")) }
-                    (line(curve.law.iter().copied(), &[], &x, &y, "after law"))
+                    @if is_line(&curve.law) {
+                        (line(curve.law.iter().copied(), &[], &x, &y, "after law"))
+                    } @else {
+                        (dots(curve.law.iter().copied().step_by(curve.law.len().div_ceil(most).max(1)), &x, &y, "after law"))
+                    }
                 },
                 x: x.clone(), y: y.clone(), class: "medium", rules: vec![], x_labels: true,
             }.render())
@@ -120,19 +126,31 @@ fn curve(curve: &EffectCurve, most: usize) -> Markup {
 }
 
 /// A law of many points as the mean over narrow stretches of the axis: a law evaluated at the data, through the filter
-/// of the band, scatters by a hair's breadth.
+/// of the band, scatters by a hair's breadth. One that hangs on more than the axis scatters by more, and stays as it is.
 fn smooth(law: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let (from, to) = extent(law.iter().map(|p| p[0]));
     if law.len() <= 2 * STRETCHES {
         return law.to_vec();
     }
-    let mut sums = vec![[0.0; 3]; STRETCHES];
+    let (from, to) = extent(law.iter().map(|p| p[0]));
+    // Of each stretch the sums of x, y, y² and 1; the last is of all.
+    let mut sums = vec![[0.0; 4]; STRETCHES + 1];
     for [x, y] in law.iter().filter(|p| p.iter().all(|v| v.is_finite())) {
         let stretch = ((x - from) / (to - from) * STRETCHES as f64) as usize;
-        let sum = &mut sums[stretch.min(STRETCHES - 1)];
-        *sum = [sum[0] + x, sum[1] + y, sum[2] + 1.0];
+        for sum in [stretch.min(STRETCHES - 1), STRETCHES] {
+            sums[sum] = std::array::from_fn(|i| sums[sum][i] + [*x, *y, y * y, 1.0][i]);
+        }
     }
-    sums.iter().filter(|s| s[2] > 0.0).map(|s| [s[0] / s[2], s[1] / s[2]]).collect()
+    let squares = |[_, y, square, n]: &[f64; 4]| if *n > 0.0 { square - y * y / n } else { 0.0 };
+    let within: f64 = sums[..STRETCHES].iter().map(squares).sum();
+    if within > SCATTERED.powi(2) * squares(&sums[STRETCHES]) {
+        return law.to_vec();
+    }
+    sums[..STRETCHES].iter().filter(|s| s[3] > 0.0).map(|s| [s[0] / s[3], s[1] / s[3]]).collect()
+}
+
+/// Whether a law that `smooth` has seen is a line over its axis: what scatters keeps all of its points.
+fn is_line(law: &[[f64; 2]]) -> bool {
+    law.len() <= 2 * STRETCHES
 }
 
 /// The range that holds all but the outermost two hundredths of the data.
@@ -185,6 +203,17 @@ fn choose(curves: &[&EffectCurve], joints: &[String]) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::report::sample;
+
+    #[test]
+    fn a_law_that_hangs_on_more_than_its_axis_is_no_line() {
+        let x = |k: usize| k as f64 / 1000.0;
+        let law = |y: &dyn Fn(usize) -> f64| -> Vec<[f64; 2]> { (0..1000).map(|k| [x(k), y(k)]).collect() };
+        // Dry friction that the filter of the band blurs by a hair's breadth, and a gain over an effort that it is not of.
+        let blurred = smooth(&law(&|k| (x(k) - 0.5).signum() + 0.02 * (k as f64 * 7.1).sin()));
+        let scattered = smooth(&law(&|k| x(k) + (k as f64 * 7.1).sin()));
+        assert!(is_line(&blurred) && blurred.len() <= STRETCHES);
+        assert!(!is_line(&scattered) && scattered.len() == 1000);
+    }
 
     #[test]
     fn the_interval_of_a_parameter_is_a_band_around_its_law() {

@@ -44,7 +44,7 @@ fn row(effect: &FoundEffect, all: &[String], shrinks: &str) -> Markup {
                     @let meaning = words::meaning(&effect.kind);
                     @if !meaning.is_empty() { p.muted { (meaning) } }
                 }
-                td.joints data-label="joints" title=(effect.joints.join(", ")) { (words::joints(&effect.joints, all)) }
+                td.joints data-label="joints" title=(effect.joints.join(", ")) { (words::breaking_text(&words::joints(&effect.joints, all))) }
                 td.nowrap data-label="confidence" { (meter(effect.confidence)) " " (format::probability_figure(effect.confidence)) "\u{202f}%" }
                 @let grows = effect.shrink.torque.is_some_and(|part| part < 0.0);
                 // On a card the label stands before the figure, which then says that it grows.

@@ -148,7 +148,20 @@ fn legend(whole: &str, own_bounds: bool) -> Markup {
     }
 }
 
-/// Regimes sorted into columns, in the order in which the diagnosis names them.
+/// The order of the columns; a regime of another name comes after them.
+const ORDER: [&str; 9] = [
+    "standstill",
+    "reversal",
+    "low_speed",
+    "high_speed",
+    "high_load",
+    "high_acceleration",
+    "pose",
+    "time",
+    "frequency_band",
+];
+
+/// Regimes sorted into columns, in one order in all tables: that of a diagnosis may be by share.
 fn groups<'a>(joints: &[&String], regimes: &'a [Regime]) -> Vec<Group<'a>> {
     let mut names: Vec<&str> = vec![];
     for regime in regimes {
@@ -156,6 +169,7 @@ fn groups<'a>(joints: &[&String], regimes: &'a [Regime]) -> Vec<Group<'a>> {
             names.push(&regime.regime);
         }
     }
+    names.sort_by_key(|name| ORDER.iter().position(|known| known == name).unwrap_or(ORDER.len()));
     names.into_iter().map(|name| Group { name, columns: columns(name, joints, regimes) }).collect()
 }
 
@@ -185,4 +199,24 @@ fn columns<'a>(name: &str, joints: &[&String], regimes: &'a [Regime]) -> Vec<Col
             Column { heading, cells }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn columns_stand_in_one_order_whatever_the_order_of_the_regimes() {
+        let (_, diagnosis, _) = sample::explained();
+        let joints: Vec<&String> = diagnosis.joints.iter().collect();
+        let names = |regimes: &[Regime]| -> Vec<String> {
+            groups(&joints, regimes).iter().map(|group| group.name.to_owned()).collect()
+        };
+        let mut regimes = diagnosis.gap.regimes.clone();
+        let before = names(&regimes);
+        regimes.sort_by(|a, b| b.share.total_cmp(&a.share));
+        assert_eq!(names(&regimes), before);
+        assert!(before.len() > 2 && before[0] == "standstill", "{before:?}");
+    }
 }

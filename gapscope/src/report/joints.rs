@@ -25,7 +25,7 @@ pub fn render(gauge: &Gauge) -> Markup {
                 span role="columnheader" { "joint" }
                 span role="columnheader" { (gauge.what) " gap, rms" }
                 span role="columnheader" { "before" }
-                @if after { span role="columnheader" { "after" } span role="columnheader" { "times less" } }
+                @if after { span role="columnheader" { "after" } span role="columnheader" { "after is" } }
                 span role="columnheader" { "floor" }
             }
             @for joint in gauge.joints.iter().filter(|joint| joint.before.is_some()) { (row(joint, gauge, after)) }
@@ -62,20 +62,25 @@ fn row(gap: &JointGap, gauge: &Gauge, after: bool) -> Markup {
             span.number role="cell" data-label="before" { (cell(&first)) }
             @if after {
                 span.number role="cell" data-label="after" { (cell(&second)) }
-                span.number role="cell" data-label="times less" { (factor(first.as_ref(), second.as_ref())) }
+                span.number role="cell" data-label="after is" { (factor(first.as_ref(), second.as_ref())) }
             }
             span.number role="cell" data-label="floor" { (floor_text) }
         }
     }
 }
 
-/// How many times smaller the gap has become; a bar beside one a hundred times as long cannot be seen.
+/// How many times smaller or larger the gap has become; a bar beside one a hundred times as long cannot be seen.
 fn factor(before: Option<&Bar>, after: Option<&Bar>) -> String {
     match (before, after) {
         // A tenth more or less is none: the gap was noise already.
-        (Some(before), Some(after)) if (before.value / after.value - 1.0).abs() < 0.1 => "same".into(),
+        (Some(before), Some(after)) if (before.value / after.value - 1.0).abs() < 0.1 => "the same".into(),
         (Some(before), Some(after)) if after.value > 0.0 && before.value.is_finite() => {
-            format!("{}×", plain_two(before.value / after.value))
+            let factor = before.value / after.value;
+            if factor >= 1.0 {
+                format!("{}× less", plain_two(factor))
+            } else {
+                format!("{}× more", plain_two(1.0 / factor))
+            }
         }
         _ => NONE.into(),
     }
@@ -93,4 +98,16 @@ fn top(unit: &str, gauge: &Gauge) -> f64 {
         figures.flat_map(|f| [f.value, f.ci95.map_or(f.value, |ends| ends[1])]).chain(joint.floor)
     });
     1.02 * bars::reach(ends)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_factor_says_which_way() {
+        let bar = |value| Bar { value, interval: None, class: "before" };
+        let say = |before, after| factor(Some(&bar(before)), Some(&bar(after)));
+        assert_eq!([say(27.0, 0.1), say(1.0, 1.05), say(1.0, 1.5)], ["270× less", "the same", "1.5× more"]);
+    }
 }

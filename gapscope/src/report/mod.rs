@@ -63,7 +63,7 @@ pub use series::picture as series_picture;
 pub use servo::{Beside, answer as servo_answer, html as servo_html};
 pub use setting::Setting;
 pub use words::{
-    beside_the_answer, capital, effect, effects, implied_unit, in_words, interval, joints as joint_list, list,
+    account, beside_the_answer, capital, effect, effects, implied_unit, in_words, interval, joints as joint_list, list,
     motion_unit, outstanding, parameter, regime, regime_phrase, rest as words_of_the_rest, said_of, sentences, verdict,
 };
 
@@ -227,7 +227,7 @@ fn header(gauge: &Gauge, top: &Top, scene: Option<&scene::Scene>) -> Markup {
                     @for doubt in top.doubts { p.fault { b { "In doubt. " } (ticked(&words::capital(&doubt.question))) } }
                     @let (tone, of) = tone(top);
                     h1 class=(tone) { (words::verdict(top.verdict)) (of) }
-                    div.said { @for line in &top.said { p { (unbroken(line)) } } }
+                    div.said { @for line in &top.said { p { (words::breaking_text(&unbroken(line))) } } }
                 }
                 (skeleton::picture(gauge, scene))
                 (skeleton::list(gauge))

@@ -8,8 +8,11 @@ use maud::{Markup, html};
 /// Kinds that a line of text names.
 const TOLD: [&str; 4] = ["coulomb_friction", "viscous_friction", "torque_bias", "payload"];
 
-/// A mass that no joint carries, kg: where only more would show, nothing does.
-const NO_BODY: f64 = 1e3;
+/// Sizes that nothing has, by unit: a mass that no joint carries, an angle beyond half a turn. Where only more would show,
+/// nothing does.
+const NOTHING_HAS: [(&str, f64); 2] = [("kg", 1e3), ("rad", std::f64::consts::PI)];
+/// A gear that loses more than it transmits stands still.
+const NO_GEAR: f64 = 1.0;
 
 /// Joints that have a column each; of more the least and the greatest size stand with their joints.
 const COLUMNS: usize = 12;
@@ -64,7 +67,7 @@ pub fn line(power: &[Power]) -> Option<String> {
     let told: Vec<String> = TOLD
         .iter()
         .filter_map(|kind| {
-            let mut sizes: Vec<&Power> = power.iter().filter(|p| p.kind == *kind && p.size.is_some()).collect();
+            let mut sizes: Vec<&Power> = power.iter().filter(|p| p.kind == *kind && shown(p).is_some()).collect();
             // Joints that slide have another unit than those that turn: the commoner one is told.
             let of = |unit: &str| sizes.iter().filter(|p| p.unit == unit).count();
             let unit = sizes.iter().max_by_key(|p| of(&p.unit))?.unit.clone();
@@ -102,15 +105,21 @@ fn rows(power: &[Power]) -> Vec<Vec<&Power>> {
 
 /// The least and the greatest size of a row, each with its joint.
 fn ends(row: &[&Power]) -> [String; 2] {
-    let sizes = || row.iter().filter_map(|p| Some((p.size?, p.joints.last()?)));
+    let sizes = || row.iter().filter_map(|p| Some((shown(p)?, p.joints.last()?)));
     let by_size = |a: &(f64, &String), b: &(f64, &String)| a.0.total_cmp(&b.0);
     [sizes().min_by(by_size), sizes().max_by(by_size)]
         .map(|end| end.map_or(NONE.into(), |(size, joint)| format!("{} at {joint}", significant(size, 2))))
 }
 
 fn cell(row: &[&Power], here: impl Fn(&Power) -> bool) -> String {
-    let size = row.iter().find(|p| here(p)).and_then(|p| p.size).filter(|size| *size < NO_BODY || row[0].unit != "kg");
-    size.map_or(NONE.into(), |size| significant(size, 2))
+    row.iter().find(|p| here(p)).and_then(|p| shown(p)).map_or(NONE.into(), |size| significant(size, 2))
+}
+
+/// The least size that shows; `None` where nothing of a size that there is would.
+fn shown(power: &Power) -> Option<f64> {
+    let by_unit = NOTHING_HAS.iter().find(|(unit, _)| *unit == power.unit).map(|(_, most)| *most);
+    let most = if power.kind == "load_dependent_friction" { Some(NO_GEAR) } else { by_unit };
+    power.size.filter(|size| most.is_none_or(|most| *size < most))
 }
 
 /// The parameter, and which way its size counts.
@@ -128,6 +137,21 @@ fn measure(power: &Power) -> String {
 mod tests {
     use super::*;
     use crate::report::sample;
+
+    #[test]
+    fn a_size_that_nothing_has_is_none() {
+        let of = |kind: &str, unit: &str, size: f64| Power {
+            kind: kind.into(),
+            joints: vec![],
+            parameter: String::new(),
+            size: Some(size),
+            unit: unit.into(),
+        };
+        let shows = |kind, unit, size| shown(&of(kind, unit, size)).is_some();
+        assert!(!shows("joint_zero_offset", "rad", 4.3e11) && shows("joint_zero_offset", "rad", 1.8));
+        assert!(!shows("load_dependent_friction", "-", 100.0) && shows("load_dependent_friction", "-", 0.2));
+        assert!(!shows("payload", "kg", 2e3) && shows("torque_saturation", "N m", 2e3));
+    }
 
     #[test]
     fn of_many_joints_the_ends_stand_with_their_names() {

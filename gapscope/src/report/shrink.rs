@@ -31,7 +31,7 @@ fn table(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Markup {
                 @if corrected {
                     td.number { (figure(change.gaps()[1])) }
                     td.number {
-                        b { (change.shrink.map_or("at the floor".into(), |part| percent_within(part, change.ci95))) }
+                        b { (part(change)) }
                         @if let Some(ends) = change.ci95 { " " small { (percent_interval(ends)) } }
                     }
                 }
@@ -57,9 +57,31 @@ fn table(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Markup {
                 @for h in &shrink.rollout { (row(&format!("rollout {} s", plain(h.horizon)), position, &h.change)) }
             }
         } }
-        p.note { (NOTE) }
+        p.note {
+            (NOTE)
+            @if corrected && changes(shrink).any(|change| change.before.is_none()) { " " (NOT_TO_COMPARE) }
+        }
     }
 }
+
+/// Every change of the table.
+fn changes(shrink: &Shrink) -> impl Iterator<Item = &Change> {
+    [&shrink.torque, &shrink.one_step].into_iter().chain(shrink.rollout.iter().map(|h| &h.change))
+}
+
+/// By what part a gap shrinks, in words where there is no part.
+pub fn part(change: &Change) -> String {
+    match (change.before, change.shrink) {
+        (_, Some(part)) => percent_within(part, change.ci95),
+        // A joint without inertia cannot be stepped, and a model that diverges has no error.
+        (None, None) => "–".into(),
+        (Some(_), None) => "at the floor".into(),
+    }
+}
+
+/// What a dash before the effects means.
+const NOT_TO_COMPARE: &str =
+    "– under before: the model as described cannot be simulated there, so that nothing can be compared.";
 
 /// How the joints are put together.
 const NOTE: &str = "Torque: each joint’s rms is divided by the standard deviation of its effort in these logs (w = 1/std) \
@@ -117,7 +139,7 @@ fn horizon(rollout: &[HorizonChange], regimes: &[Regime], corrected: bool) -> Ma
             Some([h.horizon, h.change.gaps()[0] * (1.0 - high), h.change.gaps()[0] * (1.0 - low)])
         })
         .collect();
-    let before: Vec<[f64; 2]> = rollout.iter().map(|h| [h.horizon, h.change.gaps()[0]]).collect();
+    let before: Vec<[f64; 2]> = rollout.iter().filter_map(|h| Some([h.horizon, h.change.before?])).collect();
     let after: Vec<[f64; 2]> =
         if corrected { rollout.iter().map(|h| [h.horizon, h.change.gaps()[1]]).collect() } else { vec![] };
     let x = Axis::places(&places, "horizon, s");
@@ -134,12 +156,15 @@ fn horizon(rollout: &[HorizonChange], regimes: &[Regime], corrected: bool) -> Ma
             figcaption {
                 b { "Error of open-loop rollouts over the horizon" }
                 span.legend {
-                    span.swatch.before {} " before"
-                    @if corrected { span.swatch.after {} " after, with 95 % interval" }
+                    @if !before.is_empty() { span.swatch.before {} " before" }
+                    @if corrected { span.swatch.after {} " after" @if ends.len() > 1 { ", with 95 % interval" } }
                 }
             }
             (Plot {
-                description: "Position error of open-loop rollouts over the horizon, before and after".into(),
+                description: format!(
+                    "Position error of open-loop rollouts over the horizon{}",
+                    if before.is_empty() { "; the model as described cannot be simulated" } else { ", before and after" }
+                ),
                 marks: html! {
                     @if corrected && ends.len() > 1 { (band(&ends, &x, &y, "after")) }
                     (line(before.iter().copied(), &[], &x, &y, "before thick"))
@@ -152,5 +177,26 @@ fn horizon(rollout: &[HorizonChange], regimes: &[Regime], corrected: bool) -> Ma
                 x: x.clone(), y: y.clone(), class: "high", rules: vec![], x_labels: true,
             }.render())
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn a_model_that_cannot_be_simulated_has_no_floor_and_no_line() {
+        let (_, mut diagnosis, _) = sample::explained();
+        assert!(!render(&diagnosis).into_string().contains(NOT_TO_COMPARE));
+        let nothing = |change: &mut Change| *change = Change { before: None, shrink: None, ci95: None, ..*change };
+        nothing(&mut diagnosis.shrink.one_step);
+        diagnosis.shrink.rollout.iter_mut().for_each(|h| nothing(&mut h.change));
+        let page = render(&diagnosis).into_string();
+        assert!(page.contains(NOT_TO_COMPARE) && !page.contains("at the floor"), "{page}");
+        assert!(!page.contains("swatch before") && !page.contains("with 95 % interval"), "{page}");
+        // A gap that was noise already is another thing.
+        let floor = Change { before: Some(0.1), after: Some(0.1), shrink: None, ci95: None };
+        assert_eq!(part(&floor), "at the floor");
     }
 }

@@ -45,7 +45,7 @@ fn entry(why: &Why, joints: &[String]) -> Markup {
             span {
                 (words::capital(&words::effect(&why.proposed)))
                 @if !why.joints.is_empty() { " at " (words::joints(&why.joints, joints)) }
-                span.muted { " against " (words::in_words(&why.against)) }
+                span.muted { " against " (words::account(&why.against)) }
             }
         }
     }

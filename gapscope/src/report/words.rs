@@ -32,6 +32,12 @@ pub fn in_words(text: &str) -> String {
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
+/// Another account: kinds with `+` between them, each by its one name. Anything else stays as it is.
+pub fn account(text: &str) -> String {
+    let kind = |part: &str| if Kind::named(part).is_some() { effect(part) } else { in_words(part) };
+    text.split(" + ").map(kind).collect::<Vec<_>>().join(" + ")
+}
+
 /// A text of sentences, each with a capital letter and a stop.
 pub fn sentences(text: &str) -> String {
     let list: Vec<String> = text.trim_end_matches('.').split(". ").map(capital).collect();
@@ -300,6 +306,16 @@ pub fn breaking(name: &str) -> Markup {
     }
 }
 
+/// A sentence whose long names may break between their parts, and not within one.
+pub fn breaking_text(text: &str) -> Markup {
+    html! {
+        @for (i, word) in text.split(' ').enumerate() {
+            @if i > 0 { " " }
+            @if word.contains('_') { (breaking(word)) } @else { (word) }
+        }
+    }
+}
+
 /// Characters of a name that fits a column.
 const LONG: usize = 16;
 
@@ -342,6 +358,19 @@ mod tests {
 
     fn names(list: &[&str]) -> Vec<String> {
         list.iter().map(|s| (*s).to_string()).collect()
+    }
+
+    #[test]
+    fn long_names_break_between_their_parts_in_a_sentence() {
+        let said = breaking_text("front_left_wrist_roll_joint rubs: 2.00\u{a0}N m, joint_2 does not").into_string();
+        assert_eq!(said, "front_<wbr>left_<wbr>wrist_<wbr>roll_<wbr>joint<wbr> rubs: 2.00\u{a0}N m, joint_2 does not");
+    }
+
+    #[test]
+    fn an_account_names_each_kind_by_its_one_name() {
+        let said = account("viscous_friction + armature + stribeck_friction");
+        assert_eq!(said, "viscous friction + rotor inertia (armature) + Stribeck friction");
+        assert_eq!(account("the same without it"), "the same without it");
     }
 
     #[test]

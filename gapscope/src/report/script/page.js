@@ -54,10 +54,11 @@ const watch = new IntersectionObserver((entries) => {
   if (bar) bar.scrollLeft = link.offsetLeft - 0.5 * (bar.clientWidth - link.offsetWidth);
 }, { rootMargin: "-15% 0px -70% 0px" });
 document.querySelectorAll("main > section").forEach((section) => watch.observe(section));
-const hint = () => document.querySelectorAll(".scroll").forEach((box) => {
+const wide = ".scroll, .contents";
+const hint = () => document.querySelectorAll(wide).forEach((box) => {
   box.classList.toggle("more", box.scrollWidth > box.clientWidth + 2 && box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
 });
-document.querySelectorAll(".scroll").forEach((box) => box.addEventListener("scroll", hint, { passive: true }));
+document.querySelectorAll(wide).forEach((box) => box.addEventListener("scroll", hint, { passive: true }));
 addEventListener("resize", hint);
 document.querySelectorAll("details").forEach((box) => box.addEventListener("toggle", hint));
 hint();

@@ -225,7 +225,12 @@ fn shrink(diagnosis: &Diagnosis) -> String {
 
 fn change_row(name: &str, change: &Change) -> String {
     let [before, after] = change.gaps().map(figure);
-    let shrink = change.shrink.map_or("at the floor".into(), percent);
+    let shrink = match (change.before, change.shrink) {
+        (_, Some(part)) => percent(part),
+        // A model that cannot be simulated there has no error to compare with.
+        (None, None) => NONE.into(),
+        (Some(_), None) => "at the floor".into(),
+    };
     format!("| {name} | {before} | {after} | {shrink} | {} |\n", change.ci95.map_or(NONE.into(), percent_interval))
 }
 

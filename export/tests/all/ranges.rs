@@ -1,5 +1,4 @@
 //! The region of parameters: of a diagnosis with known errors, in Rust and in the Python that goes out beside it.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
 use gapscope_export::{RANGES_SCHEMA, Ranges, SAMPLER};
 use std::process::Command;

@@ -14,6 +14,21 @@ fi
 bin="$VENV/bin"
 if [ -z "${WHEEL:-}" ]; then
     "$bin/pip" install --quiet "maturin>=1.7,<2"
+fi
+# What the tests need comes while the wheel is built. Byte code of all of it would take as long as the rest of the installation,
+# and most is never imported.
+needed() {
+    "$bin/pip" install --quiet --no-compile numpy pytest
+    # Some tests need more; without it they say that they are skipped.
+    local more=(mujoco pandas polars matplotlib fmpy mcap nbclient ipykernel)
+    "$bin/pip" install --quiet --no-compile "${more[@]}" && return
+    for one in "${more[@]}"; do
+        "$bin/pip" install --quiet --no-compile "$one" || echo "$one does not install here: its tests are skipped"
+    done
+}
+needed &
+installs=$!
+if [ -z "${WHEEL:-}" ]; then
     (cd "$here" && "$bin/maturin" build --out "$work/wheels" ${MATURIN_ARGS:---release})
     WHEEL="$(echo "$work"/wheels/*.whl)"
 fi
@@ -22,11 +37,8 @@ if [ -z "${GAPSCOPE:-}" ]; then
     GAPSCOPE="${CARGO_TARGET_DIR:-$here/../target}/release/gapscope"
 fi
 export GAPSCOPE
-"$bin/pip" install --quiet "$WHEEL" pytest
-# Some tests need more; without it they say that they are skipped.
-for more in mujoco pandas polars matplotlib fmpy mcap "nbclient ipykernel"; do
-    "$bin/pip" install --quiet $more || echo "$more does not install here: its tests are skipped"
-done
+wait "$installs"
+"$bin/pip" install --quiet --no-compile "$WHEEL"
 # From elsewhere, so that the sources cannot be found instead of the wheel.
 cd "$work"
 "$bin/python" -m pytest -q -p no:cacheprovider "$here/tests" "$@"

@@ -151,7 +151,9 @@ impl Record<'_> {
         let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());
         // What a law outside the catalogue accounts for does not speak against the effects beside it.
         let misfit = (verdict != Verdict::Explained).then_some(&beside);
-        let (found, covariance) = self.found_effects(chosen, rivals, misfit, change)?;
+        let found = self.found_effects(chosen, rivals, misfit, change)?;
+        // The answer does not hang on it: where calibration beside it is no robot's, no errors are told.
+        let covariance = self.covariance(chosen).unwrap_or(None);
         let corrected = Corrected {
             schema: MODEL_SCHEMA.to_owned(),
             robot: model.name().to_owned(),

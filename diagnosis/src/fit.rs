@@ -1,5 +1,6 @@
 //! From a set of candidates to coefficients, effects and what they leave.
 
+pub mod beside;
 pub mod break_away;
 pub mod estimate;
 pub mod held;

@@ -58,13 +58,19 @@ pub struct Diagnosis {
     pub covariance: Option<Covariance>,
 }
 
-/// Standard errors of all parameters that were found, and how they go together.
+/// Standard errors of all parameters that were found and of all calibration beside them, and how they go together.
+///
+/// An answer takes what it does not name for nothing. The logs leave more open than that: a friction too small to name, or a
+/// body of which other bodies tell as much. So bodies, friction, rotors and biases that are not named stand here too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Covariance {
     /// The parameters, number by number.
     pub parameters: Vec<ParameterError>,
     /// The lower triangle of their correlations, row by row, the diagonal of ones included.
     pub correlation: Vec<Vec<f64>>,
+    /// Degrees of freedom that the errors have themselves; 0 in files of before they were told.
+    #[serde(default)]
+    pub freedom: f64,
 }
 
 /// One number among the parameters, with its standard error.
@@ -80,10 +86,16 @@ pub struct ParameterError {
     /// Which number of a vector.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub component: Option<usize>,
-    /// Its value.
+    /// Its estimate beside all the others.
     pub value: f64,
+    /// What the answer, and so the corrected model, has; `None` where it does not name the effect.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub answer: Option<f64>,
     /// Its standard error.
     pub error: f64,
+    /// How far it was plausibly off before any log was seen; `None` where any size was plausible.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spread: Option<f64>,
     /// Unit of both.
     pub unit: String,
 }

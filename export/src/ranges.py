@@ -12,38 +12,49 @@ import pathlib
 
 import numpy as np
 
+#: The least eigenvalue of a body's pseudo-inertia, as a part of the greatest, kg m² over kg.
+LEAST = 1e-6
+
 
 class Ranges:
-    """The region |F^-1 (p - value)| <= radius of the parameters p."""
+    """The region value + F a + G b of the parameters, |a| <= radius, |b| <= radius_open: F has the directions that the logs
+    determine, G those that they leave as open as they were."""
 
     def __init__(self, file=pathlib.Path(__file__).with_name("ranges.json")):
         told = json.loads(pathlib.Path(file).read_text())
         self.parameters = told["parameters"]
-        self.factor = np.array(told["factor"])
-        self.radius = told["radius"]
+        self.determined, self.open = (np.array(told[part]).reshape(len(self.parameters), -1) for part in ("determined", "open"))
+        self.radius, self.radius_open = told["radius"], told["radius_open"]
         self.value = np.array([p["value"] for p in self.parameters])
 
-    def sample(self, rng):
-        """A robot from the region, evenly over its volume: one number a parameter, in their order and units."""
-        along = rng.standard_normal(len(self.value))
-        along *= self.radius * rng.random() ** (1 / len(along)) / np.linalg.norm(along)
-        return self.value + self.factor @ along
+    def sample(self, rng, open=0.0):
+        """A robot from the region, evenly over its volume: one number a parameter, in their order and units.
+
+        No log tells the open directions. They stay in the middle, or go as far as `open` says: 1 is all that was plausible before
+        any log. `to_mujoco` moves them where links would be no bodies."""
+        ball = lambda n, radius: (lambda x: x * radius * rng.random() ** (1 / n) / np.linalg.norm(x))(rng.standard_normal(n)) if n else np.zeros(0)
+        k, rest = self.determined.shape[1], self.open.shape[1]
+        return self.value + self.determined @ ball(k, self.radius) + self.open @ ball(rest, open * self.radius_open)
 
     def holds(self, sample):
         """Whether a robot is in the region."""
-        return np.linalg.norm(np.linalg.solve(self.factor, sample - self.value)) <= self.radius * (1 + 1e-9)
+        along = np.linalg.solve(np.hstack([self.determined, self.open]), sample - self.value)
+        k, near = self.determined.shape[1], 1 + 1e-6
+        return np.linalg.norm(along[:k]) <= self.radius * near and np.linalg.norm(along[k:]) <= self.radius_open * near
 
     def named(self, sample):
-        """(kind, parameter, joint, component) of each number with its estimate and its sample."""
-        for p, value, x in zip(self.parameters, self.value, sample):
-            yield (p["kind"], p["parameter"], p.get("joint"), p.get("component")), value, x
+        """(kind, parameter, joint, component) of each number with what the exported model has of it and its sample."""
+        for p, x in zip(self.parameters, sample):
+            neutral = 1.0 if p["parameter"] == "gain" else 0.0
+            yield (p["kind"], p["parameter"], p.get("joint"), p.get("component")), p.get("answer", neutral), x
 
     def to_mujoco(self, model, sample):
-        """Puts a sample in the place of the estimates in a MjModel of robot.xml. Returns what the model has no place for."""
+        """Puts a sample in the place of what the diagnosis found into a MjModel of robot.xml. Returns what the model has no place for."""
         import mujoco
 
         of = lambda kind, name: mujoco.mj_name2id(model, kind, name)
         left_out, bodies, tilt = [], {}, {}
+        sample = self.embodied(model, sample)
         for (kind, parameter, joint, component), value, x in self.named(sample):
             change, name = x - value, kind + "." + parameter
             j = of(mujoco.mjtObj.mjOBJ_JOINT, joint) if joint else -1
@@ -86,6 +97,38 @@ class Ranges:
                 left_out.append(f"{kind} (that of no body, left as it was)")
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return left_out
+
+    def embodied(self, model, sample):
+        """A sample with links that are bodies in a MjModel of robot.xml: open directions are moved, as no log tells of them. As near as
+        one comes where no robot with what is determined has such links."""
+        import mujoco
+
+        links = {}
+        for i, p in enumerate(self.parameters):
+            if p["kind"] == "link_inertia_error":
+                joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, p["joint"])
+                links.setdefault(int(model.jnt_bodyid[joint]), []).append(i)
+        links = {body: at for body, at in links.items() if len(at) == 10}
+        has = np.array([p.get("answer", 0.0) for p in self.parameters])
+        pseudo = lambda ten: _pseudo(ten[0], ten[1:4], _symmetric(ten[4:]))
+        without = {body: _pseudo_of(model, body) - pseudo(has[at]) for body, at in links.items()}
+        error = np.array([p["error"] for p in self.parameters])
+        free = np.linalg.pinv(self.open / error[:, None])
+        sample = np.array(sample)
+        # To and fro between bodies and what the open directions reach.
+        for _ in range(500):
+            change = np.zeros(len(sample))
+            for body, at in links.items():
+                size, axes = np.linalg.eigh(without[body] + pseudo(sample[at]))
+                if size[0] < LEAST * size[3]:
+                    whole = axes @ np.diag(np.maximum(size, 2.0 * LEAST * size[3])) @ axes.T - without[body]
+                    inertia = np.trace(whole[:3, :3]) * np.eye(3) - whole[:3, :3]
+                    six = inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
+                    change[at] = np.concatenate([[whole[3, 3]], whole[:3, 3], six]) - sample[at]
+            if not change.any():
+                break
+            sample = sample + 1.5 * self.open @ (free @ (change / error))
+        return sample
 
     def to_isaaclab(self, articulation, sample, env_ids=None):
         """Puts a sample into an Isaac Lab 2.3 `Articulation`. Returns what it has no place for. NOT RUN where it was written."""
@@ -131,8 +174,8 @@ def _body(kind, numbers, which):
     return _pseudo(mass, mass * com, about)
 
 
-def _add(model, body, change):
-    """Adds to a body; False, and nothing done, where no body would be left."""
+def _pseudo_of(model, body):
+    """The pseudo-inertia of a body of a model."""
     import mujoco
 
     turned = np.empty(9)
@@ -140,7 +183,14 @@ def _add(model, body, change):
     turned = turned.reshape(3, 3)
     mass, com = model.body_mass[body], model.body_ipos[body]
     about = turned @ np.diag(model.body_inertia[body]) @ turned.T + mass * (com @ com * np.eye(3) - np.outer(com, com))
-    whole = _pseudo(mass, mass * com, about) + change
+    return _pseudo(mass, mass * com, about)
+
+
+def _add(model, body, change):
+    """Adds to a body; False, and nothing done, where no body would be left."""
+    import mujoco
+
+    whole = _pseudo_of(model, body) + change
     if np.linalg.eigvalsh(whole)[0] <= 0.0:
         return False
     mass, com = whole[3, 3], whole[:3, 3] / whole[3, 3]

@@ -1,40 +1,48 @@
 //! A region of parameters that holds the robot, from the standard errors of a diagnosis: for randomisation.
+//!
+//! A log determines some directions of the parameters and leaves others as open as they were: of bodies it tells sums, and of an
+//! arm in a plane not even those. The two parts are kept apart. What is determined gets the ellipsoid of Hotelling's T², as its
+//! covariance is an estimate itself. What is open keeps the spread that it had before any log.
 
 use gapscope_diagnosis::schema::{Covariance, Diagnosis};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// The public name of the schema.
-pub const RANGES_SCHEMA: &str = "gapscope.ranges/1";
+pub const RANGES_SCHEMA: &str = "gapscope.ranges/2";
 
 /// A module in Python that samples the region and puts a sample into a MuJoCo model or an Isaac Lab articulation.
 pub const SAMPLER: &str = include_str!("ranges.py");
 
-/// How often the region is to hold the robot.
+/// How often what logs determine is to hold the robot.
 const PROBABILITY: f64 = 0.9;
-/// Radii of a normal distribution within which that part of simulated robots lies (31 double pendulums of
-/// `tests/export/ranges.py`): what a diagnosis leaves out or takes for another effect moves all the rest.
-const WIDER: f64 = 2.0;
-/// No combination of parameters is taken as known to better than this part of what its parameters are: correlations are
-/// written to six digits.
-const LEAST: f64 = 1e-5;
+/// How often what they leave open is to hold it, were the spreads those of a normal law.
+const PROBABILITY_OPEN: f64 = 0.99;
+/// A direction is determined where its error is below this part of what it was before any log.
+const DETERMINED: f64 = 0.5;
+/// No combination of parameters is taken as known to better than this part of what its parameters are: correlations are rounded.
+const LEAST: f64 = 1e-13;
 
-/// The region |F⁻¹ (p − value)| ≤ radius.
+/// The region value + F a + G b with |a| ≤ radius and |b| ≤ radius_open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ranges {
     /// Always [`RANGES_SCHEMA`].
     pub schema: String,
     /// Name of the robot.
     pub robot: String,
-    /// How often such a region holds the robot.
+    /// How often the determined part holds the robot.
     pub probability: f64,
-    /// Of the region, in units of F.
+    /// Of the determined part, in units of F.
     pub radius: f64,
+    /// Of the open part, in units of G.
+    pub radius_open: f64,
     /// The parameters in their order.
     pub parameters: Vec<RangeOf>,
-    /// Rows of F, with F Fᵀ the covariance of the parameters.
-    pub factor: Vec<Vec<f64>>,
+    /// Rows of F: directions that the logs determine. F Fᵀ + G Gᵀ is the covariance of the parameters.
+    pub determined: Vec<Vec<f64>>,
+    /// Rows of G: directions that the logs leave as they were before.
+    pub open: Vec<Vec<f64>>,
     /// Parameters of which the logs tell no error: they stay at their value.
     pub fixed: Vec<String>,
 }
@@ -52,10 +60,15 @@ pub struct RangeOf {
     /// Which number of a vector.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub component: Option<usize>,
-    /// The estimate.
+    /// The middle of its range: its estimate beside all the others.
     pub value: f64,
+    /// What the exported model has; `None` where the diagnosis does not name the effect, and the model is without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub answer: Option<f64>,
     /// Its standard error.
     pub error: f64,
+    /// Whether the logs determine it by itself, and not only together with others: less of its error is open than determined.
+    pub is_determined: bool,
     /// The least and the greatest in the region, whatever the others are.
     pub range: [f64; 2],
     /// Unit.
@@ -72,77 +85,100 @@ impl RangeOf {
 }
 
 impl Ranges {
-    /// The region of a diagnosis; `None` where it found nothing, or was made before diagnoses held their covariance.
+    /// The region of a diagnosis; `None` where it has no errors of parameters, or was made before diagnoses told how sure
+    /// these are themselves, or where they are too unsure for as many directions.
     pub fn new(diagnosis: &Diagnosis) -> Option<Ranges> {
-        let told = diagnosis.covariance.as_ref()?;
+        Ranges::of(&diagnosis.robot, diagnosis.covariance.as_ref()?)
+    }
+
+    /// The same of a robot's errors.
+    pub fn of(robot: &str, told: &Covariance) -> Option<Ranges> {
         let known: Vec<usize> = (0..told.parameters.len()).filter(|&i| told.parameters[i].error > 0.0).collect();
         if known.is_empty() || told.correlation.len() != told.parameters.len() {
             return None;
         }
-        let radius = ChiSquared::new(known.len() as f64).ok()?.inverse_cdf(PROBABILITY).sqrt() * WIDER;
-        let factor = factor(told, &known)?;
-        let of = |i: usize| {
+        let (determined, open) = parts(told, &known)?;
+        let radius = hotelling(determined.ncols(), told.freedom)?;
+        let radius_open = match open.ncols() {
+            0 => 0.0,
+            n => ChiSquared::new(n as f64).ok()?.inverse_cdf(PROBABILITY_OPEN).sqrt(),
+        };
+        let range_of = |row: usize, i: usize| {
             let p = &told.parameters[i];
+            let norm = |part: &DMatrix<f64>| if row < known.len() { part.row(row).norm() } else { 0.0 };
+            let (own, rest) = (norm(&determined), norm(&open));
+            let half = radius * own + radius_open * rest;
             RangeOf {
                 kind: p.kind.clone(),
                 parameter: p.parameter.clone(),
                 joint: p.joint.clone(),
                 component: p.component,
                 value: p.value,
+                answer: p.answer,
                 error: p.error,
-                range: [p.value - radius * p.error, p.value + radius * p.error],
+                is_determined: rest < own,
+                range: [p.value - half, p.value + half],
                 unit: p.unit.clone(),
             }
         };
-        let fixed = (0..told.parameters.len()).filter(|i| !known.contains(i)).map(|i| of(i).name()).collect();
+        let fixed = (0..told.parameters.len()).filter(|i| !known.contains(i));
+        let rows = |part: &DMatrix<f64>| part.row_iter().map(|row| row.iter().copied().collect()).collect();
         Some(Ranges {
             schema: RANGES_SCHEMA.to_owned(),
-            robot: diagnosis.robot.clone(),
+            robot: robot.to_owned(),
             probability: PROBABILITY,
             radius,
-            parameters: known.iter().map(|&i| of(i)).collect(),
-            factor: factor.row_iter().map(|row| row.iter().copied().collect()).collect(),
-            fixed,
+            radius_open,
+            parameters: known.iter().enumerate().map(|(row, &i)| range_of(row, i)).collect(),
+            determined: rows(&determined),
+            open: rows(&open),
+            fixed: fixed.map(|i| range_of(known.len(), i).name()).collect(),
         })
     }
 
-    /// How far a robot lies from the estimate, in units of the radius: it is in the region up to 1. `truth` has a number a
-    /// parameter. `None` where the factor is of another shape, or singular.
-    pub fn distance(&self, truth: &[f64]) -> Option<f64> {
+    /// How far a robot lies from the middle in the determined and in the open part, each in units of its radius: it is in the
+    /// region up to 1 and 1. `truth` has a number a parameter. `None` where the parts are of another shape, or singular.
+    pub fn distance(&self, truth: &[f64]) -> Option<[f64; 2]> {
         let n = self.parameters.len();
-        if truth.len() != n || self.factor.len() != n || self.factor.iter().any(|row| row.len() != n) {
+        let (k, open) = (self.determined.first()?.len(), self.open.first()?.len());
+        let is = |part: &[Vec<f64>], width: usize| part.len() == n && part.iter().all(|row| row.len() == width);
+        if truth.len() != n || k + open != n || !is(&self.determined, k) || !is(&self.open, open) {
             return None;
         }
-        let factor = DMatrix::from_fn(n, n, |i, j| self.factor[i][j]);
-        let away = nalgebra::DVector::from_fn(n, |i, _| truth[i] - self.parameters[i].value);
-        Some(factor.lu().solve(&away)?.norm() / self.radius)
+        let both = |i: usize, j: usize| if j < k { self.determined[i][j] } else { self.open[i][j - k] };
+        let away = DVector::from_fn(n, |i, _| truth[i] - self.parameters[i].value);
+        let along = DMatrix::from_fn(n, n, both).lu().solve(&away)?;
+        let over = |norm: f64, radius: f64| if norm == 0.0 { 0.0 } else { norm / radius };
+        Some([over(along.rows(0, k).norm(), self.radius), over(along.rows(k, open).norm(), self.radius_open)])
     }
 
-    /// The geometric mean of half-widths: those of the box about the region, and those of a box of the region's volume, both
-    /// over `part` of the size of each value. Parameters that are zero do not count.
-    pub fn widths(&self, part: f64) -> Option<[f64; 2]> {
-        let counted: Vec<usize> = (0..self.parameters.len()).filter(|&i| self.parameters[i].value != 0.0).collect();
-        let n = counted.len();
-        if n == 0 {
-            return None;
-        }
-        let whole = DMatrix::from_fn(self.parameters.len(), self.parameters.len(), |i, j| self.factor[i][j]);
-        let whole = &whole * whole.transpose();
-        let covariance = DMatrix::from_fn(n, n, |i, j| whole[(counted[i], counted[j])]);
-        let mean = |sum: f64| (sum / n as f64).exp();
-        let given = counted.iter().map(|&i| (part * self.parameters[i].value.abs()).ln()).sum::<f64>();
-        let about = counted.iter().map(|&i| (self.radius * self.parameters[i].error).ln()).sum::<f64>();
-        // Volume of the ellipsoid over that of the unit box of half-widths one, 2ⁿ.
-        let ball = 0.5 * n as f64 * std::f64::consts::PI.ln() - statrs::function::gamma::ln_gamma(0.5 * n as f64 + 1.0);
-        let log_determinant: f64 =
-            covariance.symmetric_eigenvalues().iter().map(|e| e.max(f64::MIN_POSITIVE).ln()).sum();
-        let volume = ball - n as f64 * 2f64.ln() + n as f64 * self.radius.ln() + 0.5 * log_determinant;
-        Some([mean(about - given), mean(volume - given)])
+    /// The geometric mean of the half-widths of the ranges over `part` of the size of each value that was found, of parameters
+    /// that the logs determine by themselves; `None` where there are none. Values of zero do not count.
+    pub fn widths(&self, part: f64) -> Option<f64> {
+        let over = |p: &RangeOf| {
+            let found = p.answer.filter(|found| p.is_determined && *found != 0.0 && p.range[1] > p.value)?;
+            Some(((p.range[1] - p.value) / (part * found.abs())).ln())
+        };
+        let logs: Vec<f64> = self.parameters.iter().filter_map(over).collect();
+        (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
     }
 }
 
-/// F of the parameters that are known, from errors and correlations.
-fn factor(told: &Covariance, known: &[usize]) -> Option<DMatrix<f64>> {
+/// Radius within which an estimate of so many numbers lies from the truth, in units of a covariance that has so many degrees of
+/// freedom itself: Hotelling's T². `None` where they are too few.
+fn hotelling(numbers: usize, freedom: f64) -> Option<f64> {
+    if numbers == 0 {
+        return Some(0.0);
+    }
+    let numbers = numbers as f64;
+    let rest = freedom - numbers + 1.0;
+    let quantile = FisherSnedecor::new(numbers, rest).ok()?.inverse_cdf(PROBABILITY);
+    (rest > 0.0 && quantile.is_finite()).then(|| (numbers * freedom / rest * quantile).sqrt())
+}
+
+/// F and G of the parameters that are known. In units of the covariance C = H Hᵀ the precision before any log is Hᵀ P H: its
+/// eigenvectors are directions whose errors neither before nor after go together, its eigenvalues the squares of error over spread.
+fn parts(told: &Covariance, known: &[usize]) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let n = known.len();
     let mut correlation = DMatrix::identity(n, n);
     for a in 0..n {
@@ -155,13 +191,22 @@ fn factor(told: &Covariance, known: &[usize]) -> Option<DMatrix<f64>> {
     if correlation.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let parts = correlation.symmetric_eigen();
-    let mut factor = parts.eigenvectors;
-    for (mut column, value) in factor.column_iter_mut().zip(parts.eigenvalues.iter()) {
+    let eigen = correlation.symmetric_eigen();
+    let mut root = eigen.eigenvectors;
+    for (mut column, value) in root.column_iter_mut().zip(eigen.eigenvalues.iter()) {
         column *= value.max(LEAST).sqrt();
     }
-    for (mut row, i) in factor.row_iter_mut().zip(known) {
+    // In units of spreads, nothing for what was any size.
+    let over_spread = DMatrix::from_fn(n, n, |i, j| match told.parameters[known[i]].spread {
+        Some(spread) => root[(i, j)] * told.parameters[known[i]].error / spread,
+        None => 0.0,
+    });
+    let before = (over_spread.transpose() * over_spread).symmetric_eigen();
+    for (mut row, i) in root.row_iter_mut().zip(known) {
         row *= told.parameters[*i].error;
     }
-    Some(factor)
+    let along = root * before.eigenvectors;
+    let (determined, open): (Vec<usize>, Vec<usize>) =
+        (0..n).partition(|&i| before.eigenvalues[i] < DETERMINED * DETERMINED);
+    Some((along.select_columns(&determined), along.select_columns(&open)))
 }

@@ -1,5 +1,6 @@
 """From a diagnosis into MuJoCo itself."""
 
+import importlib.util
 import runpy
 import shutil
 import sys
@@ -106,3 +107,28 @@ def test_a_mujoco_users_day(monkeypatch, tmp_path, capsys):
     names = runpy.run_path(str(EXAMPLE), run_name="__main__")
     assert names["after"] < 0.2 * names["before"], capsys.readouterr().out
     assert np.isfinite(names["after"])
+
+
+def test_samples_of_the_region_are_robots(command, tmp_path):
+    """Links that logs determine in sums alone: a sample moves them as it must, and what no log tells makes bodies of them."""
+    logs, out, made = tmp_path / "logs", tmp_path / "out", tmp_path / "made"
+    command("generate", "double_pendulum", "--perturb", "--seed", 100, "--episodes", 2, "--seconds", 8, "--rate", 200, "--out", logs)
+    command("diagnose", logs / "robot.urdf", *sorted(logs.glob("episode_*.csv")), "--out", out)
+    command("export", out, "--robot", logs / "robot.urdf", "--to", "mjcf", "--ranges", "--out", made)
+    spec = importlib.util.spec_from_file_location("sample_ranges", made / "sample_ranges.py")
+    sampler = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sampler)
+    ranges, random = sampler.Ranges(), np.random.default_rng(0)
+    k = ranges.determined.shape[1]
+    along = lambda sample: np.linalg.solve(np.hstack([ranges.determined, ranges.open]), sample - ranges.value)[:k]
+    frictions = []
+    for open_ in [0.0] * 20 + [0.1] * 20:
+        sample = ranges.sample(random, open=open_)
+        assert ranges.holds(sample)
+        model = mujoco.MjModel.from_xml_path(str(made / "robot.xml"))
+        assert ranges.to_mujoco(model, sample) == []
+        frictions.append(model.dof_frictionloss.copy())
+        np.testing.assert_allclose(along(ranges.embodied(model, sample)), along(sample), atol=1e-4)
+    found = {p["joint"]: p for p in ranges.parameters if p["parameter"] == "coulomb"}
+    for of_joint, joint in zip(np.transpose(frictions), ("joint1", "joint2")):
+        assert found[joint]["range"][0] < of_joint.min() < of_joint.max() < found[joint]["range"][1]

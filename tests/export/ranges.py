@@ -2,14 +2,14 @@
 
     python tests/export/ranges.py GAPSCOPE --robots 100
 
-Robots are those of `generate --perturb`, on two logs of noisy sensors. A robot counts as held
-where the truth of all parameters of its region lies in it; of an effect that the robot has not, the truth is none.
+Robots are those of `generate --perturb`, on two logs of noisy sensors. A robot counts as held where the truth of all parameters
+of its region lies in it; of an effect that the robot has not, the truth is none. What the logs determine and what they leave
+open are counted apart, and widths are those of parameters that they determine.
 Needs NumPy. Not in CI: a robot takes some seconds.
 """
 
 import argparse
 import json
-import math
 import pathlib
 import subprocess
 import tempfile
@@ -35,7 +35,8 @@ def numbers(effects):
 
 
 def robot(gapscope, model, seed, seconds, folder):
-    """Parameters, distance in radii, and the two mean widths of one robot; None where it has no region."""
+    """Parameters, determined directions, the two distances in radii, log of the mean width, and how many parameters of the truth
+    the region lacks; None where there is no region."""
     run = lambda *words: subprocess.run([gapscope, *map(str, words)], check=True, capture_output=True, text=True).stdout
     logs = folder / "logs"
     run("generate", model, "--perturb", "--seed", seed, "--episodes", 2, "--seconds", seconds, "--rate", RATE, *SENSORS, "--out", logs)
@@ -47,22 +48,22 @@ def robot(gapscope, model, seed, seconds, folder):
         return None
     ranges = json.loads((folder / "ranges" / "ranges.json").read_text())
     truth = numbers(json.loads((logs / "truth.json").read_text())["effects"])
-    parameters, factor = ranges["parameters"], np.array(ranges["factor"])
+    parameters = ranges["parameters"]
+    part = lambda name: np.array(ranges[name]).reshape(len(parameters), -1)
+    determined, open_ = part("determined"), part("open")
     value = np.array([p["value"] for p in parameters])
-    error = np.array([p["error"] for p in parameters])
     neutral = lambda p: 1.0 if p["parameter"] == "gain" else 0.0
     key = lambda p: (p["kind"], p["parameter"], p.get("joint"), p.get("component"))
     there = np.array([truth.get(key(p), neutral(p)) for p in parameters])
-    distance = np.linalg.norm(np.linalg.solve(factor, there - value)) / ranges["radius"]
-    sized = np.abs(value) > 0
-    part = lambda half: np.log(half[sized] / (0.2 * np.abs(value[sized]))).mean()
-    n = len(value)
-    # The box of the region's volume, as half-widths.
-    ball = 0.5 * n * math.log(math.pi) - math.lgamma(0.5 * n + 1) - n * math.log(2)
-    log_volume = ball + n * math.log(ranges["radius"]) + np.linalg.slogdet(factor)[1]
-    same = log_volume / n - np.log(0.2 * np.abs(value[sized])).mean()
-    missed = sum(1 for k in truth if k not in {key(p) for p in parameters})
-    return n, distance, part(ranges["radius"] * error), same, missed
+    along = np.linalg.solve(np.hstack([determined, open_]), there - value)
+    k = determined.shape[1]
+    of_open = np.linalg.norm(along[k:]) / ranges["radius_open"] if k < len(value) else 0.0
+    half = np.array([p["range"][1] - p["value"] for p in parameters])
+    found = np.array([p.get("answer", 0.0) for p in parameters])
+    counts = np.array([p["is_determined"] for p in parameters]) & (found != 0.0) & (half > 0.0)
+    widths = np.log(half[counts] / (0.2 * np.abs(found[counts])))
+    missed = sum(1 for name in truth if name not in {key(p) for p in parameters})
+    return len(value), k, np.linalg.norm(along[:k]) / ranges["radius"], of_open, widths.mean(), missed
 
 
 def main():
@@ -81,13 +82,14 @@ def main():
             print(f"robot {seed}: no region", flush=True)
             continue
         told.append(one)
-        n, distance, box, volume, missed = one
-        print(f"robot {seed}: {n} parameters, at {distance:.3f} radii, {missed} not named", flush=True)
-    distance = np.array([one[1] for one in told])
-    print(f"\n{len(told)} robots, {np.mean([one[0] for one in told]):.0f} parameters each")
-    print(f"the region holds the truth of {np.mean(distance <= 1):.2f} of them; 90 % lie within {np.quantile(distance, 0.9):.2f} radii")
-    print(f"geometric mean of half-widths over those of ± 20 %: {np.exp(np.mean([one[2] for one in told])):.2f} (box about the region), "
-          f"{np.exp(np.mean([one[3] for one in told])):.3f} (box of its volume)")  # fmt: skip
+        n, k, distance, of_open, width, missed = one
+        print(f"robot {seed}: {k} of {n} directions determined, at {distance:.3f} radii; the open ones at {of_open:.3f}; "
+              f"widths {np.exp(width):.2f} of ± 20 %, {missed} not in it", flush=True)  # fmt: skip
+    n, k, distance, of_open, width, _ = (np.array(column) for column in zip(*told))
+    print(f"\n{len(told)} robots, {n.mean():.0f} parameters each, {k.mean():.0f} directions determined")
+    print(f"the region holds the truth of {np.mean((distance <= 1) & (of_open <= 1)):.2f} of them: what is determined of {np.mean(distance <= 1):.2f} "
+          f"(90 % lie within {np.quantile(distance, 0.9):.2f} radii), what is open of {np.mean(of_open <= 1):.2f}")  # fmt: skip
+    print(f"geometric mean of half-widths over those of ± 20 %, of parameters that are determined: {np.exp(np.mean(width)):.2f}")
 
 
 if __name__ == "__main__":

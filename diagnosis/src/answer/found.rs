@@ -1,6 +1,5 @@
 //! Which effects were found, how sure each is, what it cannot be told from, and why.
 
-use crate::answer::covariance::covariance;
 use crate::answer::verdict::Judged;
 use crate::fit::estimate::{Fit, speeds};
 use crate::fit::problem::Problem;
@@ -20,18 +19,18 @@ fn calibrated(evidence: f64) -> f64 {
 }
 
 impl Record<'_> {
-    /// The effects found, strongest first, each held against what could take its place, with the errors of their parameters. What
-    /// an account leaves of the gap, `misfit`, speaks against all of it; `change` measures what each does alone.
+    /// The effects found, strongest first, each held against what could take its place. What an account leaves of the gap, `misfit`,
+    /// speaks against all of it; `change` measures what each does alone.
     pub(crate) fn found_effects(
         &self,
         chosen: &Chosen,
         rivals: &[Rival],
         misfit: Option<&Judged>,
         change: impl Fn(&Rows) -> Change,
-    ) -> Result<(Vec<FoundEffect>, Option<Covariance>), EffectError> {
+    ) -> Result<Vec<FoundEffect>, EffectError> {
         let (problem, fit) = (&chosen.exact, &chosen.fit);
         let speeds = speeds(&self.signals, &self.band, self.model.dof());
-        let (mut found, mut told) = (Vec::new(), Vec::new());
+        let mut found = Vec::new();
         for (effect, own) in fit.effects_with_candidates(problem, self.model) {
             let kind = effect.kind();
             let of_it = fit.told(problem, self.model, kind, &own, &speeds);
@@ -80,13 +79,11 @@ impl Record<'_> {
                     shrink: EffectShrink { torque: alone.shrink, ci95: alone.ci95 },
                 },
             ));
-            told.push((effect, of_it));
         }
         // Strongest first: by what the best explanation without it leaves.
         let alone = |effect: &FoundEffect| effect.shrink.torque.unwrap_or(0.0);
         found.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| alone(&b.1).total_cmp(&alone(&a.1))));
-        let covariance = covariance(self.model, &fit.over_time(problem), &told);
-        Ok((found.into_iter().map(|(_, effect)| effect).collect(), covariance))
+        Ok(found.into_iter().map(|(_, effect)| effect).collect())
     }
 
     /// The comparisons that decided: each kind found against the best account without it, each spring or play that was tried

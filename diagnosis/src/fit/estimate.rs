@@ -31,7 +31,7 @@ pub fn speeds(signals: &[Signals], band: &Band, joints: usize) -> Vec<Vec<usize>
 }
 
 /// Half of a 95 % interval in standard errors, where so many groups of rows tell the error.
-fn quantile(groups: usize) -> f64 {
+pub(crate) fn quantile(groups: usize) -> f64 {
     StudentsT::new(0.0, 1.0, groups.saturating_sub(1).max(1) as f64).map_or(1.96, |t| t.inverse_cdf(0.975))
 }
 

@@ -5,6 +5,7 @@ mod embody;
 mod evidence;
 mod score;
 mod solve;
+mod together;
 mod weigh;
 
 use crate::fit::terms::{Entry, Term};
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 pub use score::{Score, Solved};
 use solve::{JointNormal, Normal};
 use std::borrow::Cow;
+pub use together::Together;
 
 /// Rows of one joint: filtered columns and target.
 #[derive(Debug, Clone)]

@@ -48,7 +48,7 @@ struct Reached {
 impl Data<'_> {
     /// A problem of some terms, bent by what was found and weighed by what is left there. Before anything was found, a drive
     /// that turns on its own has the rotor that its account begins with: by the signature of a rigid one it would be any.
-    fn about(&self, terms: Vec<Term>, found: Option<&Bend>) -> Problem {
+    pub(super) fn about(&self, terms: Vec<Term>, found: Option<&Bend>) -> Problem {
         let mut problem = self.problem(terms, &Kind::ALL);
         let set: Vec<usize> = (0..problem.entries.len()).collect();
         match found {

@@ -67,16 +67,25 @@ impl Problem {
         self.training.par_iter().map(|training| self.solve(columns, training, &mut held.clone())).collect()
     }
 
+    /// How far a coefficient was plausibly off before any log; `None` where any size is.
+    pub fn spread(&self, column: usize) -> Option<f64> {
+        (self.prior[column] > 0.0).then(|| self.prior[column].sqrt().recip())
+    }
+
     /// Covariance of the coefficients by the sandwich over blocks, which allows for any correlation inside a block.
     pub fn covariance(&self, columns: &[usize], theta: &[f64]) -> DMatrix<f64> {
+        self.sandwich(columns, &self.scores(columns, theta))
+    }
+
+    /// What the rows of each block pull each coefficient by.
+    pub(super) fn scores(&self, columns: &[usize], theta: &[f64]) -> Vec<DVector<f64>> {
         let of_block = |block: &Normal| {
             DVector::from_fn(columns.len(), |i, _| {
                 let g: f64 = columns.iter().zip(theta).map(|(&c, t)| block.gram[(columns[i], c)] * t).sum();
                 block.moment[columns[i]] - g
             })
         };
-        let scores: Vec<DVector<f64>> = self.blocks.iter().filter(|b| b.square > 0.0).map(of_block).collect();
-        self.sandwich(columns, &scores)
+        self.blocks.iter().filter(|b| b.square > 0.0).map(of_block).collect()
     }
 
     /// The same by the sandwich over parts of the rows, `part` telling the part of each row of the band: a law that is not
@@ -112,7 +121,7 @@ impl Problem {
         &bread * (meat * factor + prior) * &bread
     }
 
-    fn regular(&self, columns: &[usize], normal: &Normal) -> DMatrix<f64> {
+    pub(super) fn regular(&self, columns: &[usize], normal: &Normal) -> DMatrix<f64> {
         let mut gram = DMatrix::from_fn(columns.len(), columns.len(), |i, j| normal.gram[(columns[i], columns[j])]);
         for i in 0..columns.len() {
             gram[(i, i)] = gram[(i, i)] * (1.0 + RIDGE) + f64::MIN_POSITIVE.sqrt() + self.prior[columns[i]];

@@ -1,5 +1,4 @@
 //! Used arms: that they are robots, that what is further shows, and that banks of them hold what they should.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gapscope_dynamics::{Inertia, Model, robots};
 use gapscope_effects::Kind;

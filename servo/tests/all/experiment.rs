@@ -1,5 +1,4 @@
 //! The next experiment of a servo arm, logged on the arm that was found: whether it tells what it promises.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
 use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;

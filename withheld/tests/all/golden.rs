@@ -1,11 +1,10 @@
 //! Judgements and totals of a reference scorer written apart from this one, as `tests/withheld/agree.py` stored them.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gapscope_withheld::{Answer, CaseScore, Score, Truth, judge};
 use serde_json::{Value, json};
 
 fn golden() -> Value {
-    serde_json::from_str(include_str!("../golden/judgements.json")).unwrap()
+    serde_json::from_str(include_str!("../../golden/judgements.json")).unwrap()
 }
 
 /// Numbers alike, whether JSON writes them as 1 or 1.0; parameters in any order.

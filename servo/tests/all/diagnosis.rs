@@ -1,5 +1,4 @@
 //! Diagnoses of servo arms: simulated ones whose truth is known, and the real logs beside the project where they are.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
 use gapscope_datasets::{Episode, ReadOptions, read_logs};
 use gapscope_dynamics::Model;

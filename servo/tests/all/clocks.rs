@@ -1,5 +1,4 @@
 //! Clocks and encoders as servo buses have them: they neither invent an effect nor hide one.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gapscope_datasets::{Episode, Fault, FaultKind, find_faults, mend};
 use gapscope_dynamics::Model;

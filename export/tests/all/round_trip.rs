@@ -1,5 +1,4 @@
 //! What is exported, read again by our own readers: the same torque for the same motion, unit by unit and sign by sign.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gapscope_diagnosis::{Corrected, EncoderSide, MODEL_SCHEMA};
 use gapscope_dynamics::{Loaded, Model, robots};
@@ -11,7 +10,7 @@ use roxmltree::Document;
 
 /// Robots: built-in ones, one with branches and fixed links, one with what a URDF may leave out, and a prismatic joint.
 fn robots() -> Vec<(String, Loaded)> {
-    let branched = include_str!("../../dynamics/golden/branched.urdf");
+    let branched = include_str!("../../../dynamics/golden/branched.urdf");
     [robots::arm7(), robots::arm6(), robots::double_pendulum(), branched, BARE]
         .map(|xml| (xml.to_owned(), Model::from_urdf(xml).unwrap()))
         .to_vec()

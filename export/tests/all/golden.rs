@@ -1,5 +1,4 @@
 //! An exported model in MuJoCo: golden figures, made by `export/golden/make.py`.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gapscope_diagnosis::Corrected;
 use gapscope_dynamics::robots;
@@ -9,12 +8,16 @@ use gapscope_export::{Robot, Target, export};
 #[test]
 fn mujoco_takes_the_torque_of_the_corrected_robot() {
     let loaded = robots::model("arm6").unwrap().unwrap();
-    let corrected = Corrected::from_json(include_str!("../golden/corrected.json"), &loaded.model).unwrap();
+    let corrected = Corrected::from_json(include_str!("../../golden/corrected.json"), &loaded.model).unwrap();
     let robot = Robot { text: robots::arm6(), loaded: &loaded, is_mjcf: false, dt: gapscope_export::DT };
     let text = export(Target::Mjcf, &robot, &corrected, &[]).unwrap().text;
-    assert_eq!(text, include_str!("../golden/robot.xml"), "run export/golden/make.py: MuJoCo has not seen this file");
+    assert_eq!(
+        text,
+        include_str!("../../golden/robot.xml"),
+        "run export/golden/make.py: MuJoCo has not seen this file"
+    );
 
-    let figures: serde_json::Value = serde_json::from_str(include_str!("../golden/figures.json")).unwrap();
+    let figures: serde_json::Value = serde_json::from_str(include_str!("../../golden/figures.json")).unwrap();
     let gain: Vec<f64> = loaded.model.joints().iter().map(|j| if j.name == "joint2" { 0.9 } else { 1.0 }).collect();
     let mut plant = Plant::new(&loaded.model, &corrected.effects, 1e-3).unwrap();
     let mut rest = [0.0; 6];

@@ -1,5 +1,4 @@
 //! Faults of logs of used arms that were once silent, or mended wrongly: cases of banks, made again by their seeds.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gapscope_datasets::{FaultKind, Faults, find_faults};
 use gapscope_dynamics::{Model, robots};

@@ -1,5 +1,4 @@
 //! Nothing is dropped in silence, and no figure is given that is not known.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gapscope_diagnosis::{Corrected, EncoderSide, MODEL_SCHEMA};
 use gapscope_dynamics::robots;

@@ -1,5 +1,4 @@
 //! Figures of used arms, on judgements made by hand.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gapscope_dynamics::{Model, robots};
 use gapscope_withheld::{Answer, CaseScore, Score, Truth, Used, impossible_bodies, judge, judge_arm};

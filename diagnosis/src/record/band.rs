@@ -128,36 +128,19 @@ impl Band {
     /// The same with samples where `counts` is false left out of the sums; `None` for rows that have too few left.
     pub fn filter_where(&self, episode: usize, counts: &[bool], x: &[f64]) -> Vec<Option<f64>> {
         let kernel = &self.kernels[episode];
-        let parts = faded(counts, kernel.reach / 2);
         self.rows[self.of_episode[episode].clone()]
             .iter()
             .map(|row| {
                 let first = row.center - kernel.reach;
                 let (mut sum, mut weight) = (0.0, 0.0);
-                for (w, k) in kernel.value.iter().zip(first..) {
-                    if parts[k] > 0.0 {
-                        sum += w * parts[k] * x[k];
-                        weight += w * parts[k];
+                for (i, w) in kernel.value.iter().enumerate() {
+                    if counts[first + i] {
+                        sum += w * x[first + i];
+                        weight += w;
                     }
                 }
                 (weight >= LEAST_WEIGHT).then(|| sum / weight)
             })
             .collect()
     }
-}
-
-/// What each sample counts beside those that do not: a kernel that is cut off lets through what is fast, as all noise of a
-/// differentiated position is, and one that fades does not.
-fn faded(counts: &[bool], reach: usize) -> Vec<f64> {
-    let mut apart = vec![reach + 1; counts.len()];
-    for forwards in [true, false] {
-        let mut since = reach + 1;
-        for i in 0..counts.len() {
-            let k = if forwards { i } else { counts.len() - 1 - i };
-            since = if counts[k] { (since + 1).min(reach + 1) } else { 0 };
-            apart[k] = apart[k].min(since);
-        }
-    }
-    let part = |samples: usize| (0.5 * std::f64::consts::PI * samples as f64 / (reach + 1) as f64).sin().powi(2);
-    apart.into_iter().map(part).collect()
 }

@@ -330,3 +330,32 @@ fn calibration(logs: &Record<'_>, s: &Signals, joint: usize) -> Vec<Vec<f64>> {
 fn turning() -> impl Iterator<Item = (Kind, Turning)> {
     Kind::ALL.into_iter().filter_map(|kind| Some((kind, kind.card().turning?)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gapscope_datasets::{Recipe, generate};
+    use gapscope_dynamics::robots;
+    use gapscope_effects::{CoulombFriction, Effect, ViscousFriction};
+
+    /// What friction is beside a rigid drive hides a spring: beside each drive it is whatever leaves least.
+    #[test]
+    fn friction_and_bias_are_free_beside_a_drive() {
+        let model = robots::model("double_pendulum").unwrap().unwrap().model;
+        let joint = || model.joints()[0].name.clone();
+        let rubs = [
+            Effect::ViscousFriction(ViscousFriction { viscous: [(joint(), 0.5)].into() }),
+            Effect::CoulombFriction(CoulombFriction { coulomb: [(joint(), 0.3)].into() }),
+        ];
+        let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
+        let log = generate(&model, &rubs, 1, &recipe, "log").unwrap();
+        let record = Record::new(&model, &[log], &mut Vec::new());
+        let noise = [1e-3; 2];
+        let nothing = record.data(&noise).problem(Vec::new(), &Kind::ALL);
+        let runs = record.joint_runs(&nothing, &Fit::on_all(&nothing, &[])).unwrap();
+        let study = Study::new(&record, &runs, 0, false);
+        let rest = study.at_rows(View::default(), |e| study.runs[e].left_by(&Candidate::rotor(0), 0.0));
+        let left = mean_square(&study.rows(&Candidate::rotor(0), study.rotor, View::default()));
+        assert!(left < 1e-3 * mean_square(&rest), "{left} of {}", mean_square(&rest));
+    }
+}

@@ -155,8 +155,9 @@ impl Record<'_> {
                 if own.len() > 1 {
                     let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
                     let without = chosen.with(Choice { set }, exact, fit);
-                    // What bodies could stand for has a wide interval, though they would have to be what they hardly can.
-                    if chosen.odds_against(&without, self)? > 0.0 {
+                    // A rotor or a friction that links could stand for has a wide interval, though they hardly can be what they
+                    // would have to be.
+                    if kind.is_calibration() && chosen.odds_against(&without, self)? > 0.0 {
                         needed.push(candidate);
                     } else {
                         chosen = without;

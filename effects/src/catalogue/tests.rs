@@ -151,3 +151,15 @@ fn there_is_one_rotor_and_a_motor_that_turns_comes_with_it() {
         assert!(kind.card().bends && kind.card().filters(), "{kind}");
     }
 }
+
+/// All that is plausible of a payload is small where its mass is; one that was not said to be of some size may be a load.
+#[test]
+fn a_light_payload_is_light_in_all_its_numbers() {
+    let robot = robot();
+    let of: Vec<Candidate> = Candidate::all(&robot).into_iter().filter(|c| c.kind == Kind::Payload).collect();
+    assert_eq!(of.len(), 2, "a load and a light tool at the one end of the chain");
+    let [load, tool] = [&of[0], &of[1]].map(|c| c.scales(&robot).unwrap());
+    assert!(load.iter().zip(&tool).all(|(load, tool)| (tool / load - 0.25).abs() < 1e-12));
+    let any = Candidate::new(Kind::Payload, of[0].joints.clone());
+    assert_eq!(any.scales(&robot).unwrap(), load);
+}

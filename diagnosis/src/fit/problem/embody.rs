@@ -150,6 +150,10 @@ mod tests {
         assert!(body.divergence(&own(&fit.theta)).is_some(), "{:?}", fit.theta);
         let free = problem.solve_unbounded(&fit.columns, &problem.total);
         assert!(body.divergence(&own(&free)).is_none(), "{free:?}");
+        // What no body can take over stays in the joint, and shows where the edge of what one can be holds the fit back.
+        let (left, free) = (problem.left(&fit), problem.free_left(&fit));
+        assert!(free[0] < 0.01 * left[0], "{free:?} {left:?}");
+        assert_eq!(crate::search::climb::less_is_left(&problem, &left, &free), [0]);
     }
 
     /// A thin rod whose middle lies beside its line: the first moment alone would leave no body, and the way to the second

@@ -267,11 +267,12 @@ fn coefficients_at_their_bounds_are_effects_that_the_plant_takes() {
 fn a_robot_offers_every_kind_where_it_can_be() {
     for (name, joints) in robots::NAMES.into_iter().zip([7, 6, 2]) {
         let all = Candidate::all(&robot(name));
-        // Eight laws a joint and one of its link, one load, one base, and two signs of a coupling for each pair of neighbours.
-        assert_eq!(all.len(), (8 + 1) * joints + 1 + 1 + 2 * (joints - 1), "{name}");
+        // Eight laws a joint and one of its link, two sizes of a load, one base, and two signs of a coupling for each pair of
+        // neighbours.
+        assert_eq!(all.len(), (8 + 1) * joints + 2 + 1 + 2 * (joints - 1), "{name}");
         assert_eq!(
             all.iter().filter(|c| c.kind == Kind::Payload).map(|c| c.joints[0]).collect::<Vec<_>>(),
-            [joints - 1]
+            [joints - 1; 2]
         );
         let kinds: BTreeSet<Kind> = all.iter().map(|c| c.kind).collect();
         let not_alone = |kind: &Kind| kind.card().turned_by_tangent().is_none() && !kind.card().is_late();

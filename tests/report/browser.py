@@ -131,6 +131,15 @@ def check(browser, file, size, scheme, args):
     return faults
 
 
+def becomes(page, holds):
+    """Whether a state comes: looked for every 30 ms for up to 5 s, as a busy machine answers late."""
+    for _ in range(167):
+        if holds():
+            return True
+        page.wait_for_timeout(30)
+    return False
+
+
 def use_report(page):
     faults = use_contents(page)
     chart = page.locator("#live .chart")
@@ -145,48 +154,46 @@ def use_report(page):
         page.keyboard.press("+")
         near = page.evaluate(span)
         page.keyboard.press("+")
-        if not page.evaluate(span) < near:
+        if not becomes(page, lambda: page.evaluate(span) < near):
             faults.append("the key + does not zoom")
         page.keyboard.press("0")
         page.keyboard.press("ArrowRight")
-        if "measured" not in page.locator("#live output").inner_text():
+        if not becomes(page, lambda: "measured" in page.locator("#live output").inner_text()):
             faults.append("an arrow key reads nothing")
         page.locator("[data-zoom=in]").click()
         page.locator("[data-zoom=in]").click()
-        if not page.evaluate(span) < near:
+        if not becomes(page, lambda: page.evaluate(span) < near):
             faults.append("the button + does not zoom")
         page.locator("[data-zoom=all]").click()
         box = page.locator("#live .u-over").first.bounding_box()
         page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 50)
-        if "measured" not in page.locator("#live output").inner_text():
+        if not becomes(page, lambda: "measured" in page.locator("#live output").inner_text()):
             faults.append("the pointer reads nothing")
         before = page.evaluate(ticks(page))
         page.mouse.down()
         page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60, steps=4)
         page.mouse.up()
-        page.wait_for_timeout(60)
-        if page.evaluate(ticks(page)) == before:
+        if not becomes(page, lambda: page.evaluate(ticks(page)) != before):
             faults.append("dragging does not zoom")
         page.locator("[data-zoom=all]").click()
     for button in page.locator("[data-copy]").all()[:2]:
         button.scroll_into_view_if_needed()
         button.focus()
         page.keyboard.press("Enter")
-        page.wait_for_timeout(30)
-        if button.inner_text() == "Copy":
+        if not becomes(page, lambda: button.inner_text() != "Copy"):
             faults.append("nothing is copied or selected")
     chips = page.locator("[data-pick]")
     filtered = "[...document.querySelectorAll('[data-joints]')].filter((e) => e.classList.contains('filtered')).length"
     if chips.count() > 1 and page.locator("[data-joints]").count():
         chips.nth(1).click()
-        if not page.evaluate(filtered) or not page.locator("#filter").is_visible():
+        if not becomes(page, lambda: page.evaluate(filtered) and page.locator("#filter").is_visible()):
             faults.append("a joint of the list filters nothing")
         page.locator("#filter button").click()
-        if page.evaluate(filtered):
+        if not becomes(page, lambda: not page.evaluate(filtered)):
             faults.append("the filter does not go away")
         chips.nth(0).focus()
         page.keyboard.press("Enter")
-        if not page.evaluate(filtered):
+        if not becomes(page, lambda: page.evaluate(filtered)):
             faults.append("Enter on a joint of the list filters nothing")
         page.keyboard.press("Enter")
     if page.locator("#skeleton").count():
@@ -195,39 +202,35 @@ def use_report(page):
         before = page.evaluate(drawn)
         page.locator("#skeleton").focus()
         page.keyboard.press("ArrowLeft")
-        turned = page.evaluate(drawn)
-        if turned == before:
+        if not becomes(page, lambda: page.evaluate(drawn) != before):
             faults.append("an arrow key does not turn the robot")
+        turned = page.evaluate(drawn)
         box = page.locator("#skeleton").bounding_box()
         page.mouse.move(box["x"] + 8, box["y"] + 20)
         page.mouse.down()
         page.mouse.move(box["x"] + 90, box["y"] + 30, steps=4)
         page.mouse.up()
-        if page.evaluate(drawn) == turned:
+        if not becomes(page, lambda: page.evaluate(drawn) != turned):
             faults.append("dragging does not turn the robot")
         if chips.count() > 1:
             page.locator("#skeleton .joint").nth(0).focus()
             page.keyboard.press("Enter")
-            if not page.evaluate(filtered):
+            if not becomes(page, lambda: page.evaluate(filtered)):
                 faults.append("Enter on a joint of the robot filters nothing")
             page.keyboard.press("Enter")
-            page.wait_for_timeout(30)
+            becomes(page, lambda: not page.evaluate(filtered))
             page.locator("#skeleton .joint .barrel").first.dispatch_event("click")
-            if not page.evaluate(filtered):
+            if not becomes(page, lambda: page.evaluate(filtered)):
                 faults.append("a click on a joint of the robot filters nothing")
             page.locator("#filter button").click()
         stands = "[...document.querySelectorAll('#skeleton line')].map((l) => l.getAttribute('x2') + l.getAttribute('y2')).join()"
         for button in page.locator("[data-play]").all():
             name, still = button.inner_text(), page.evaluate(stands)
             button.click()
-            if button.inner_text() != "Stop":
+            if not becomes(page, lambda: button.inner_text() == "Stop"):
                 faults.append(f"{name}: does not play")
             # A log may begin at rest.
-            for _ in range(25):
-                page.wait_for_timeout(200)
-                if page.evaluate(stands) != still:
-                    break
-            else:
+            if not becomes(page, lambda: page.evaluate(stands) != still):
                 faults.append(f"{name}: nothing moves")
             if not page.locator("#skeleton").is_visible() or not in_sight(page, "#skeleton"):
                 faults.append(f"{name}: the robot that moves is out of sight")
@@ -236,7 +239,7 @@ def use_report(page):
             for _ in range(3):
                 if button.inner_text() == "Stop":
                     page.keyboard.press("Enter")
-            if button.inner_text() != name:
+            if not becomes(page, lambda: button.inner_text() == name):
                 faults.append(f"{name}: Enter does not stop it")
     return faults
 
@@ -256,11 +259,13 @@ def use_contents(page):
             page.keyboard.press("Enter")
         else:
             link.click()
-        page.wait_for_timeout(60)
-        at, height = page.evaluate(f"{WHERE}('{place}')"), page.viewport_size["height"]
-        end = page.evaluate("scrollY + innerHeight >= document.documentElement.scrollHeight - 2")
-        if not (-2 <= at < 0.2 * height or end and at < height):
-            faults.append(f"the link {place} leads to {at:.0f} px")
+        height, ends = page.viewport_size["height"], "scrollY + innerHeight >= document.documentElement.scrollHeight - 2"
+
+        def top():
+            return page.evaluate(f"{WHERE}('{place}')")
+
+        if not becomes(page, lambda: -2 <= top() < 0.2 * height or page.evaluate(ends) and top() < height):
+            faults.append(f"the link {place} leads to {top():.0f} px")
         if place != "#top" and not in_sight(page, ".contents"):
             faults.append(f"at {place} the links are out of sight")
     page.evaluate("history.replaceState(null, '', location.pathname)")

@@ -24,7 +24,7 @@ const SETTLED_BENT: f64 = 0.1;
 const SETTLED: f64 = 2e-3;
 /// Rounds, at most, where a drive turns on its own: friction behind it comes nearer by a part of the way each time.
 const ROUNDS_OF_TURNING: usize = 20;
-/// Fall of the misfit, see [`Problem::misfit`], at which such an account has settled: half a nat.
+/// Fall of the misfit, see [`Problem::misfit`], for which such an account takes no further step: half a nat.
 const SETTLED_MISFIT: f64 = 1.0;
 /// Times that a step which leaves more than the one before is halved.
 const HALVINGS: usize = 3;
@@ -86,6 +86,12 @@ impl Data<'_> {
             .collect()
     }
 
+    /// What the nominal robot leaves of every run: `[episode][joint][signal]`, N m or N.
+    pub fn nominal_rest(&self) -> &[Vec<Vec<f64>>] {
+        let of = |s: &Signals| residual(&mut Plant::nominal(self.model, s.dt), self.model, s, self.standstill, 0.0);
+        self.known.nominal_rest.get_or_init(|| self.signals.par_iter().map(of).collect())
+    }
+
     /// What the effects of a fit change of the residual of every run, knobs where they stand.
     ///
     /// # Errors
@@ -93,11 +99,11 @@ impl Data<'_> {
     pub fn bend(&self, problem: &Problem, fit: &Fit) -> Result<Bend, EffectError> {
         let effects = fit.effects(problem, self.model);
         let side = problem.side(&fit.set);
-        let change = |s: &Signals| -> Result<Vec<Vec<f64>>, EffectError> {
+        let nominal = self.nominal_rest();
+        let change = |(s, nominal): (&Signals, &Vec<Vec<f64>>)| -> Result<Vec<Vec<f64>>, EffectError> {
             let mut with = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
             let mut exact = residual(&mut with, self.model, s, self.standstill, 0.0);
-            let nominal = residual(&mut Plant::nominal(self.model, s.dt), self.model, s, self.standstill, 0.0);
-            for (x, n) in exact.iter_mut().zip(&nominal) {
+            for (x, n) in exact.iter_mut().zip(nominal) {
                 x.iter_mut().zip(n).for_each(|(x, n)| *x -= n);
             }
             Ok(exact)
@@ -108,7 +114,7 @@ impl Data<'_> {
             theta[c] = fit.own(problem, c).1;
             theta[c].truncate(problem.entries[c].columns.len() - usize::from(problem.entries[c].tangent));
         }
-        Ok(Bend { change: self.signals.par_iter().map(change).collect::<Result<_, _>>()?, theta })
+        Ok(Bend { change: self.signals.par_iter().zip(nominal).map(change).collect::<Result<_, _>>()?, theta })
     }
 
     /// Bends a problem by what was found, `places` telling where its entries stand in that problem.
@@ -225,7 +231,6 @@ impl Data<'_> {
         let mut misfit_before = f64::INFINITY;
         let turns = candidates.iter().any(Candidate::turns);
         let most = if turns { ROUNDS_OF_TURNING } else { ROUNDS };
-        let mut settled = !turns;
         let mut reached: Option<Reached> = None;
         let mut loaded: Option<Vec<Signals>> = None;
         let mut round = 0;
@@ -269,13 +274,15 @@ impl Data<'_> {
                 }
             }
             let misfit = problem.misfit(&fit, self.band);
-            let still = !bends || round >= ROUNDS_OF_BENT && (turns || (misfit - misfit_before).abs() < SETTLED_BENT);
+            let still = match &reached {
+                // By the straight line about the point reached there is nothing to be had.
+                Some(last) => last.misfit - misfit < SETTLED_MISFIT,
+                None => !bends || round >= ROUNDS_OF_BENT && (misfit - misfit_before).abs() < SETTLED_BENT,
+            };
             misfit_before = misfit;
             let most = if change < SETTLED && bends { most.max(ROUNDS_FOR_BENT) } else { most };
-            if round >= most || (round >= 1 && change < SETTLED && settled && still) {
-                if let Some(last) = &reached
-                    && data.look(&problem, &fit)?.1 > last.misfit
-                {
+            if round >= most || (round >= 1 && change < SETTLED && still) {
+                if let Some(last) = &reached {
                     fit.move_to(&problem, &last.coefficients, 1.0);
                 }
                 let mut problem = problem;
@@ -298,7 +305,6 @@ impl Data<'_> {
                     round = most;
                     continue;
                 };
-                settled = reached.as_ref().is_some_and(|last| last.misfit - misfit < SETTLED_MISFIT);
                 reached = Some(Reached { misfit, coefficients: at.coefficients(&problem) });
                 bend
             } else {

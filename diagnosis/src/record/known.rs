@@ -1,14 +1,21 @@
-//! Filtered columns that every problem of the same logs has alike: those of laws without a knob that read nothing found.
+//! What every problem of the same logs has alike: filtered columns of laws without a knob that read nothing found, and what the
+//! nominal robot leaves.
 
 use crate::record::band::Band;
 use crate::record::signals::Signals;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Candidate, Column};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
-/// Candidates whose columns stay, with those columns at the rows of a band.
+/// What is known of some logs before anything is found.
 #[derive(Debug, Clone, Default)]
-pub struct Known(Vec<(Candidate, Vec<Column>)>);
+pub struct Known {
+    /// Candidates whose columns stay, with those columns at the rows of a band.
+    columns: Vec<(Candidate, Vec<Column>)>,
+    /// What the nominal robot leaves of every run: `[episode][joint][signal]`, N m or N.
+    pub nominal_rest: OnceLock<Vec<Vec<Vec<f64>>>>,
+}
 
 impl Known {
     /// The columns of all candidates of a robot that stay as they are whatever else is found in its logs.
@@ -26,12 +33,12 @@ impl Known {
             let columns = at_rows(model, signals, band, standstill, &c);
             (c, columns)
         };
-        Known(candidates.into_par_iter().map(filtered).collect())
+        Known { columns: candidates.into_par_iter().map(filtered).collect(), ..Known::default() }
     }
 
     /// The columns of a candidate at the rows of the band, where they are known.
     pub fn of(&self, candidate: &Candidate) -> Option<&[Column]> {
-        self.0.iter().find(|(known, _)| known == candidate).map(|(_, columns)| columns.as_slice())
+        self.columns.iter().find(|(known, _)| known == candidate).map(|(_, columns)| columns.as_slice())
     }
 }
 

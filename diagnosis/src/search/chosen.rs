@@ -12,6 +12,7 @@ use gapscope_effects::{Candidate, EffectError, Kind};
 pub(crate) type Rest = Vec<Vec<Vec<f64>>>;
 
 /// What the search came to.
+#[derive(Clone)]
 pub(crate) struct Chosen {
     /// Every candidate, around the parameters found.
     pub all: Problem,

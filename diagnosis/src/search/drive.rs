@@ -111,8 +111,8 @@ struct Rigid {
 }
 
 impl Record<'_> {
-    /// The best account of the drive of each of some joints that is better than a rigid one, beside other effects, none of
-    /// them such a drive; best first.
+    /// The best spring and the best play in the drive of each of some joints that are better than a rigid one, beside other
+    /// effects, none of them such a drive; best first.
     pub(crate) fn accounts(
         &self,
         joints: &[usize],
@@ -122,7 +122,7 @@ impl Record<'_> {
     ) -> Result<Vec<Account>, EffectError> {
         let runs = self.joint_runs(problem, others)?;
         let mut found: Vec<Account> =
-            joints.par_iter().filter_map(|&j| Study::new(self, &runs, j, through).best()).collect();
+            joints.par_iter().flat_map_iter(|&j| Study::new(self, &runs, j, through).best()).collect();
         found.sort_by(|a, b| b.beyond.total_cmp(&a.beyond));
         Ok(found)
     }
@@ -190,25 +190,26 @@ impl<'a> Study<'a> {
                 noisier(s, run, s.position_noise[joint], white(s), seed)
             })
             .collect();
-        let effort = mean(&logs.signals.iter().map(|s| mean_square(&s.tau[joint])).collect::<Vec<_>>());
-        study.unnoticed = UNNOTICED.get() * UNNOTICED.get() * effort;
+        let efforts: Vec<f64> = logs.signals.iter().flat_map(|s| s.tau[joint].iter().copied()).collect();
+        study.unnoticed = UNNOTICED.get().powi(2) * (mean_square(&efforts) - mean(&efforts).powi(2)).max(0.0);
         study.rigid = study.rigid_in(View::default());
         study.rotor = study.turn(rigid, study.rotor).1;
         study.rigid = study.rigid_in(View::default());
         study
     }
 
-    fn best(&self) -> Option<Account> {
+    /// The best account of each kind that is better than a rigid drive.
+    fn best(&self) -> Vec<Account> {
         if !tells(&self.rigid, &self.rigid.left) {
-            return None;
+            return Vec::new();
         }
         let rest = self.rows(&Candidate::rotor(self.joint), self.rotor, View::default());
         let left_of = |e: usize| mean_square(&rest[self.logs.band.of_episode[e].clone()]);
         let episode = (0..self.runs.len()).max_by(|&a, &b| left_of(a).total_cmp(&left_of(b)));
         let first = self.rigid_in(View { episode, smooth: None });
-        let mut best: Option<(f64, Candidate, f64)> = None;
-        for side in [EncoderSide::Link, EncoderSide::Motor] {
-            for (kind, turning) in turning() {
+        let of_kind = |(kind, turning): (Kind, Turning)| {
+            let mut best: Option<(f64, Candidate, f64)> = None;
+            for side in [EncoderSide::Link, EncoderSide::Motor] {
                 if self.through && turning.filtered != Some(side) {
                     continue;
                 }
@@ -250,15 +251,16 @@ impl<'a> Study<'a> {
                     best = Some((measure, drive, rotor));
                 }
             }
-        }
-        let (_, drive, rotor) = best?;
-        let drive = Candidate { rotor, ..drive };
-        let rigid = self.against(&drive, rotor);
-        let beyond = beyond_doubt(&rigid, &self.left(&drive, rotor, &rigid))?;
-        // At the edge of what a drive can be, it stands in for something else.
-        let (least, greatest) = drive.kind.card().turning?.possible;
-        let possible = self.shows(rotor) && (least..greatest).contains(&drive.shape);
-        possible.then_some(Account { drive, beyond })
+            let (_, drive, rotor) = best?;
+            let drive = Candidate { rotor, ..drive };
+            let rigid = self.against(&drive, rotor);
+            let beyond = beyond_doubt(&rigid, &self.left(&drive, rotor, &rigid))?;
+            // At the edge of what a drive can be, it stands in for something else.
+            let (least, greatest) = turning.possible;
+            let possible = self.shows(rotor) && (least..greatest).contains(&drive.shape);
+            possible.then_some(Account { drive, beyond })
+        };
+        turning().filter_map(of_kind).collect()
     }
 
     /// Whether a rotor is heavy enough for its drive to show. A link without inertia about its joint has no drive that turns
@@ -336,7 +338,7 @@ mod tests {
     use super::*;
     use gapscope_datasets::{Recipe, generate};
     use gapscope_dynamics::robots;
-    use gapscope_effects::{CoulombFriction, Effect, ViscousFriction};
+    use gapscope_effects::{Armature, Backlash, CoulombFriction, Effect, ViscousFriction};
 
     /// What friction is beside a rigid drive hides a spring: beside each drive it is whatever leaves least.
     #[test]
@@ -357,5 +359,23 @@ mod tests {
         let rest = study.at_rows(View::default(), |e| study.runs[e].left_by(&Candidate::rotor(0), 0.0));
         let left = mean_square(&study.rows(&Candidate::rotor(0), study.rotor, View::default()));
         assert!(left < 1e-3 * mean_square(&rest), "{left} of {}", mean_square(&rest));
+    }
+
+    /// What hits its stops hard looks like a spring at first: both go on to their exact laws, where they are told apart.
+    #[test]
+    fn of_a_drive_with_play_the_spring_is_looked_at_beside_the_play() {
+        let model = robots::model("double_pendulum").unwrap().unwrap().model;
+        let on = |value: f64| [(model.joints()[0].name.clone(), value)].into();
+        let play = [Effect::Backlash(Backlash { gap: on(0.04) }), Effect::Armature(Armature { armature: on(0.5) })];
+        let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
+        let log = generate(&model, &play, 1, &recipe, "log").unwrap();
+        let record = Record::new(&model, &[log], &mut Vec::new());
+        let noise = [1e-3; 2];
+        let nothing = record.data(&noise).problem(Vec::new(), &Kind::ALL);
+        let accounts = record.accounts(&[0, 1], &nothing, &Fit::on_all(&nothing, &[]), false).unwrap();
+        let kinds: Vec<Kind> =
+            accounts.iter().filter(|a| a.drive.joints == [0]).map(|account| account.drive.kind).collect();
+        assert!(kinds.contains(&Kind::Backlash), "{accounts:?}");
+        assert!(kinds.iter().all(|kind| kinds.iter().filter(|other| *other == kind).count() == 1), "{accounts:?}");
     }
 }

@@ -8,14 +8,30 @@ use crate::record::floor::noise_floor;
 use crate::record::logs::{Progress, Record};
 use crate::search::chosen::{Chosen, Turned};
 use crate::search::climb;
+use crate::search::climb::Choice;
 use crate::search::converge::weighing;
+use crate::search::drive::Account;
 use gapscope_effects::{Candidate, EffectError};
 
-/// Accounts of drives that are tried in each pass.
+/// Accounts of drives that are turned beside each base: of those likelier than a rigid drive, the likeliest. One goes on.
 const ACCOUNTS: usize = 2;
 /// Turns that a drive and what stands beside it take, at most, and the fall of the misfit that is worth another.
 const TURNS: usize = 6;
 const TURN_LEAVES: f64 = 10.0;
+
+/// What accounts of drives are tried beside.
+struct Base {
+    /// What was found, rotors aside.
+    others: (Problem, Fit),
+    /// What goes into the choice with a drive.
+    choice: Choice,
+    /// The same with rigid drives: a drive that is not likelier is none.
+    rigid: Chosen,
+    /// Joints that are looked at.
+    joints: Vec<usize>,
+    /// Whether springs are looked for through a filter.
+    through: bool,
+}
 
 impl Record<'_> {
     /// Puts a spring or play in the drive of one joint where the logs speak for it: beside all else that was found, beside the
@@ -29,8 +45,14 @@ impl Record<'_> {
         };
         let restless = |exact: &Problem, fit: &Fit| self.restless(&rigid.noise, exact, fit);
         // What was found beyond calibration may stand in for a drive: beside calibration alone more is left.
-        let joints = restless(&rigid.exact, &rigid.fit)?;
-        let mut bases = vec![(without_rotors(&rigid), rigid.choice.clone(), joints, false)];
+        let base = |of: &Chosen, joints: Vec<usize>, through: bool| Base {
+            others: without_rotors(of),
+            choice: of.choice.clone(),
+            rigid: of.clone(),
+            joints,
+            through,
+        };
+        let mut bases = vec![base(&rigid, restless(&rigid.exact, &rigid.fit)?, false)];
         if climb::kinds(&rigid.all, &rigid.choice.set).into_iter().any(|kind| !kind.is_calibration()) {
             let calibration = |c: &&Candidate| c.kind.is_calibration() && !c.kind.card().rotor;
             let bodies: Vec<Candidate> =
@@ -40,45 +62,47 @@ impl Record<'_> {
             let calibrated = self.calibrated(&rigid, progress)?;
             let has_rotor = calibrated.exact.entries.iter().any(|e| e.candidate.kind.card().rotor);
             if has_rotor || calibrated.choice.set != choice.set {
-                let anew = self.data(&rigid.noise).refine(&bodies)?;
-                let joints = restless(&anew.0, &anew.1)?;
-                bases.push((anew, choice, joints, false));
+                let others = self.data(&rigid.noise).refine(&bodies)?;
+                let joints = restless(&others.0, &others.1)?;
+                bases.push(Base { others, choice, rigid: calibrated.clone(), joints, through: false });
             }
             let joints = restless(&calibrated.exact, &calibrated.fit)?;
-            bases.push((without_rotors(&calibrated), calibrated.choice, joints, false));
+            bases.push(base(&calibrated, joints, false));
         }
-        let any = |j: &usize| bases.iter().any(|(_, _, joints, _)| joints.contains(j));
+        let any = |j: &usize| bases.iter().any(|base| base.joints.contains(j));
         let joints: Vec<usize> = (0..self.model.dof()).filter(any).collect();
         if joints.is_empty() {
             return Ok(rigid);
         }
-        bases.push((without_rotors(&rigid), rigid.choice.clone(), joints, true));
+        bases.push(base(&rigid, joints, true));
         let mut best: Option<Chosen> = None;
         let mut tried: Vec<(Candidate, f64)> = Vec::new();
-        for (others, base, joints, through) in bases {
-            if through && best.is_some() {
+        for base in bases {
+            if base.through && best.is_some() {
                 break;
             }
-            for account in self.accounts(&joints, &others.0, &others.1, through)?.into_iter().take(ACCOUNTS) {
-                let (all, place) = self.with_rotor(&rigid, account.drive.joints[0]);
-                let mut choice = base.clone();
-                choice.set.push(place);
-                choice.set.sort_unstable();
-                choice.set.dedup();
-                let turned = Turned { place, drive: account.drive, odds: 0.0, beside: Vec::new() };
-                // Beside what was found as it is, and with the choice made again around it.
-                let (turned, plain) = self.turned(&rigid.noise, &all, &choice.set, turned, through)?;
-                let next = self.converge(all, choice.clone(), rigid.noise.clone(), Some(turned.clone()), progress)?;
-                let plain = Chosen { turned: Some(turned.clone()), ..next.with(choice, plain.0, plain.1) };
-                let next = if plain.odds_against(&next, self)? > 0.0 { plain } else { next };
-                if !next.has_rotor() {
-                    continue;
-                }
-                let odds = next.odds_against(best.as_ref().unwrap_or(&rigid), self)?;
-                tried.push((turned.drive, odds));
-                if odds > 0.0 {
-                    best = Some(next);
-                }
+            let (likelier, others) = self.likelier(&base)?.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > 0.0);
+            tried.extend(others.into_iter().filter_map(|(chosen, odds)| Some((chosen.turned?.drive, odds))));
+            let mut turned: Vec<(Chosen, f64)> = Vec::new();
+            for (beside, _) in likelier.into_iter().take(ACCOUNTS) {
+                let beside = self.turned(beside, base.through)?;
+                let odds = beside.odds_against(&base.rigid, self)?;
+                turned.push((beside, odds));
+            }
+            turned.sort_by(|a, b| b.1.total_cmp(&a.1));
+            let Some((beside, _)) = turned.into_iter().next() else { continue };
+            // Beside what was found as it is, and with the choice made again around it.
+            let Chosen { all, choice, noise, turned, .. } = beside.clone();
+            let next = self.converge(all, choice, noise, turned, progress)?;
+            let next = if beside.odds_against(&next, self)? > 0.0 { beside } else { next };
+            let Some(drive) = next.turned.as_ref().map(|turned| turned.drive.clone()) else { continue };
+            if !next.has_rotor() {
+                continue;
+            }
+            let odds = next.odds_against(best.as_ref().unwrap_or(&rigid), self)?;
+            tried.push((drive, odds));
+            if odds > 0.0 {
+                best = Some(next);
             }
         }
         let Some(best) = best else { return Ok(Chosen { tried, ..rigid }) };
@@ -93,32 +117,45 @@ impl Record<'_> {
         Ok(Chosen { turned, tried, ..best })
     }
 
-    /// A drive turned to where it leaves least beside the other candidates of a set, and the set at its exact law: what friction is
-    /// beside a rigid drive hides how far a spring winds up, so that drive and friction are found by turns.
-    fn turned(
-        &self,
-        noise: &[f64],
-        all: &Problem,
-        set: &[usize],
-        mut turned: Turned,
-        through: bool,
-    ) -> Result<(Turned, (Problem, Fit)), EffectError> {
-        let mut best = self.data(noise).exact(all, set, Some(&turned))?;
+    /// The accounts of drives beside a base, each at its exact law, and by how many nats it is likelier than rigid drives;
+    /// likeliest first.
+    fn likelier(&self, base: &Base) -> Result<Vec<(Chosen, f64)>, EffectError> {
+        let mut found: Vec<(Chosen, f64)> = Vec::new();
+        for account in self.accounts(&base.joints, &base.others.0, &base.others.1, base.through)? {
+            let (all, place) = self.with_rotor(&base.rigid, account.drive.joints[0]);
+            let mut set = [base.choice.set.as_slice(), &[place]].concat();
+            set.sort_unstable();
+            set.dedup();
+            let turned = Turned { place, drive: account.drive, odds: 0.0, beside: Vec::new() };
+            let (exact, fit) = self.data(&base.rigid.noise).exact(&all, &set, Some(&turned))?;
+            let beside = Chosen { all, turned: Some(turned), ..base.rigid.with(Choice { set }, exact, fit) };
+            let odds = beside.odds_against(&base.rigid, self)?;
+            found.push((beside, odds));
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        Ok(found)
+    }
+
+    /// The same with its drive turned to where it leaves least beside the rest of it: what friction is beside a rigid drive hides
+    /// how far a spring winds up, so that drive and friction are found by turns.
+    fn turned(&self, mut best: Chosen, through: bool) -> Result<Chosen, EffectError> {
         for _ in 0..TURNS {
-            let (exact, fit) = &best;
-            turned = turned.beside(exact, fit);
+            let Some(turned) = best.turned.take().map(|turned| turned.beside(&best.exact, &best.fit)) else { break };
+            best.turned = Some(turned.clone());
+            let (exact, fit) = (&best.exact, &best.fit);
             let beside = (0..exact.entries.len()).filter(|&i| !exact.entries[i].candidate.turns()).collect();
             let others = Fit { set: beside, ..fit.clone() };
             let again = self.accounts(&turned.drive.joints, exact, &others, through)?;
-            let Some(account) = again.into_iter().next() else { break };
-            let next = Turned { drive: account.drive, ..turned.clone() };
-            let (next_exact, next_fit) = self.data(noise).exact(all, set, Some(&next))?;
+            let same = |account: &Account| account.drive.kind == turned.drive.kind;
+            let Some(account) = again.into_iter().find(same) else { break };
+            let next = Turned { drive: account.drive, ..turned };
+            let (next_exact, next_fit) = self.data(&best.noise).exact(&best.all, &best.choice.set, Some(&next))?;
             if next_exact.misfit(&next_fit, &self.band) > exact.misfit(fit, &self.band) - TURN_LEAVES {
                 break;
             }
-            (turned, best) = (next, (next_exact, next_fit));
+            best = Chosen { turned: Some(next), ..best.with(best.choice.clone(), next_exact, next_fit) };
         }
-        Ok((turned, best))
+        Ok(best)
     }
 
     /// The best account of calibration alone: what was found beyond it may stand in for a drive.
@@ -126,7 +163,10 @@ impl Record<'_> {
         let (mut all, mut choice) = (rigid.all.clone(), rigid.choice.clone());
         all.closed.extend(all.entries.iter().map(|e| e.candidate.kind).filter(|kind| !kind.is_calibration()));
         choice.set.retain(|&c| all.entries[c].candidate.kind.is_calibration());
-        self.converge(all, choice, rigid.noise.clone(), None, progress)
+        let mut calibrated = self.converge(all, choice, rigid.noise.clone(), None, progress)?;
+        // What comes with a drive may be any kind.
+        calibrated.all.closed.clone_from(&rigid.all.closed);
+        Ok(calibrated)
     }
 
     /// Joints of which a fit leaves more than noise, those with most of it first.

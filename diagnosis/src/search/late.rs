@@ -48,10 +48,20 @@ impl Record<'_> {
         // What they leave counts as a hint: noise is in it.
         let hint = rival.odds_against(&chosen, self)?.clamp(-told.hint, told.hint);
         let odds = self.odds_of_the_second([&chosen, &rival], &told)? + hint;
-        let (mut likelier, lost) = if odds <= 0.0 { (chosen, other) } else { (rival, lost) };
+        let told = if odds <= 0.0 { [(chosen, other), (rival, lost)] } else { [(rival, lost), (chosen, other)] };
+        let mut doubt = 1.0 / (1.0 + odds.abs().exp());
+        let [(mut likelier, mut lost), (second, first)] = told;
+        // The instrument takes one of the two to be there. One that is not likelier than none of them is not.
+        let mut set = likelier.choice.set.clone();
+        set.retain(|&c| !likelier.all.entries[c].candidate.kind.card().is_late());
+        let (exact, fit) = self.data(&likelier.noise).exact(&likelier.all, &set, likelier.turned.as_ref())?;
+        let none = likelier.with(Choice { set }, exact, fit);
+        if likelier.odds_against(&none, self)? <= 0.0 && second.odds_against(&none, self)? > 0.0 {
+            (likelier, lost, doubt) = (second, first, 0.5);
+        }
         // What was decided here no climb turns round.
         likelier.all.closed.push(likelier.all.entries[lost].candidate.kind);
-        likelier.late_doubt = Some(1.0 / (1.0 + odds.abs().exp()));
+        likelier.late_doubt = Some(doubt);
         Ok(likelier)
     }
 

@@ -50,7 +50,7 @@ pub struct Problem {
     prior: Vec<f64>,
     /// Time between two samples of the fastest log, s.
     pub sample: f64,
-    /// Typical effort of each joint, N m or N.
+    /// Standard deviation of the effort of each joint, N m or N.
     pub scale: Vec<f64>,
     /// Standard deviation of what the weighing set does not explain, N m or N, with the immaterial part as its least value.
     pub sigma: Vec<f64>,
@@ -170,10 +170,11 @@ impl Problem {
         }
         let scale = (0..n)
             .map(|j| {
-                let (sum, count) = signals.iter().fold((0.0, 0usize), |(sum, count), s| {
-                    (sum + s.tau[j].iter().map(|t| t * t).sum::<f64>(), count + s.len())
-                });
-                (sum / count.max(1) as f64).sqrt().max(1e-9)
+                let efforts = || signals.iter().flat_map(|s| s.tau[j].iter());
+                let count = efforts().count().max(1) as f64;
+                let mean = efforts().sum::<f64>() / count;
+                // What is the same all the time a bias explains exactly.
+                (efforts().map(|tau| (tau - mean).powi(2)).sum::<f64>() / count).sqrt().max(1e-9)
             })
             .collect();
         let p = bounds.len();

@@ -24,3 +24,14 @@ fn known_columns_are_those_of_a_problem_without_them() {
     let (with, without) = (gram(&known), gram(&Known::default()));
     assert!(without.norm() > 0.0 && (with - &without).norm() < 1e-12 * without.norm());
 }
+
+/// A load that never changes says nothing of how exact a law is: a bias takes it up.
+#[test]
+fn a_constant_effort_does_not_make_a_joint_more_tolerant() {
+    let scale = |bias: f64| {
+        let (.., problem, _) = support::fitted(Kind::CoulombFriction, |s| s.tau[0].iter_mut().for_each(|t| *t += bias));
+        problem.scale
+    };
+    let (plain, biased) = (scale(0.0), scale(1e3));
+    assert!(plain.iter().zip(&biased).all(|(a, b)| (a / b - 1.0).abs() < 1e-6), "{plain:?} {biased:?}");
+}

@@ -146,8 +146,11 @@ impl Record<'_> {
             let beside = (0..exact.entries.len()).filter(|&i| !exact.entries[i].candidate.turns()).collect();
             let others = Fit { set: beside, ..fit.clone() };
             let again = self.accounts(&turned.drive.joints, exact, &others, through)?;
-            let same = |account: &Account| account.drive.kind == turned.drive.kind;
-            let Some(account) = again.into_iter().find(same) else { break };
+            let same =
+                |account: &Account| (account.drive.kind, account.drive.side) == (turned.drive.kind, turned.drive.side);
+            let far = |account: &Account| (account.drive.shape / turned.drive.shape).ln().abs();
+            let nearest = again.into_iter().filter(same).min_by(|a, b| far(a).total_cmp(&far(b)));
+            let Some(account) = nearest else { break };
             let next = Turned { drive: account.drive, ..turned };
             let (next_exact, next_fit) = self.data(&best.noise).exact(&best.all, &best.choice.set, Some(&next))?;
             if next_exact.misfit(&next_fit, &self.band) > exact.misfit(fit, &self.band) - TURN_LEAVES {

@@ -119,14 +119,14 @@ impl Record<'_> {
         })
     }
 
-    /// What is left of a joint at the rows at which it slides.
-    pub(crate) fn sliding(&self, joint: usize, rows: &[f64]) -> Vec<f64> {
+    /// What is left of a joint at the rows of each log, nothing where it does not slide.
+    pub(crate) fn sliding(&self, joint: usize, rows: &[f64]) -> Vec<Vec<Option<f64>>> {
         let slides = |(e, s): (usize, &Signals)| {
             let slides = s.slides(joint, self.still[joint]);
             let at_rows = self.band.filter_where(e, &slides, &vec![0.0; s.len()]);
-            self.band.of_episode[e].clone().zip(at_rows).filter_map(|(row, slides)| slides.map(|_| rows[row]))
+            self.band.of_episode[e].clone().zip(at_rows).map(|(row, slides)| slides.map(|_| rows[row])).collect()
         };
-        self.signals.iter().enumerate().flat_map(slides).collect()
+        self.signals.iter().enumerate().map(slides).collect()
     }
 
     pub(crate) fn nominal(&self) -> HeldOut {

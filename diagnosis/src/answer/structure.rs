@@ -2,17 +2,20 @@
 //!
 //! The noise floor is read above the band, and noise whose spectrum falls with frequency stands out of it inside: that of a
 //! current, or of an effort that comes in coarse counts. Such noise knows nothing of the motion: no network predicts it, it is
-//! of one size at all times, and a moment later it is forgotten. A law that the catalogue lacks is none of these.
+//! of one size at all times, a moment later it is forgotten, and it has no tone. A law that the catalogue lacks is none of these.
 
-use crate::numbers::decide::{PREDICTED, REMEMBERED, UNEVEN};
+use crate::numbers::decide::{PREDICTED, PRICE_OF_ODD, REMEMBERED, UNEVEN};
+use nalgebra::Complex;
+use std::f64::consts::TAU;
 
 /// Rows of a second at the usual cut-off, and the least seconds that tell.
 const SECOND: usize = 25;
 const SECONDS: usize = 12;
 
-/// Root mean square of what is left of a joint at the rows at which it moves, where that is noise; a network predicts a part
-/// of its square.
-pub fn noise(rows: &[f64], predicted: f64) -> Option<f64> {
+/// Root mean square of what is left of a joint, where that is noise: at the rows of each log, nothing where it rests. A network
+/// predicts a part of its square.
+pub fn noise(logs: &[Vec<Option<f64>>], predicted: f64) -> Option<f64> {
+    let rows: Vec<f64> = logs.iter().flatten().flatten().copied().collect();
     let power = rows.iter().map(|x| x * x).sum::<f64>();
     if power <= 0.0 || rows.len() < SECOND * SECONDS || predicted > PREDICTED.get() {
         return None;
@@ -26,7 +29,50 @@ pub fn noise(rows: &[f64], predicted: f64) -> Option<f64> {
     let middle = mean(&seconds);
     let spread = mean(&seconds.iter().map(|s| (s - middle).powi(2)).collect::<Vec<_>>()) / middle.powi(2);
     let even = spread < UNEVEN.get() * 2.0 * remembered / SECOND as f64;
-    (remembered < REMEMBERED.get() && even).then(|| (power / rows.len() as f64).sqrt())
+    (remembered < REMEMBERED.get() && even && !has_tone(logs)).then(|| (power / rows.len() as f64).sqrt())
+}
+
+/// Frequencies to either side of one by which the level about it is told, and how many of the nearest may be its own.
+const ABOUT: usize = 16;
+const OWN: usize = 2;
+/// The first frequency, in periods of the longest log: below it noise that falls with frequency is no level.
+const PERIODS: usize = 8;
+
+/// Whether something of one frequency goes on in the logs of a joint, at the rows of each log, 0 where it rests: a part of the
+/// power that matters, at which the periodogram (Schuster 1898) stands out from its neighbours beyond the chance of the best
+/// of all frequencies.
+fn has_tone(logs: &[Vec<Option<f64>>]) -> bool {
+    let longest = logs.iter().map(Vec::len).max().unwrap_or(0);
+    let square: f64 = logs.iter().flatten().flatten().map(|x| x * x).sum();
+    let moved = logs.iter().filter(|log| log.iter().flatten().any(|x| *x != 0.0)).count() as f64;
+    if square <= 0.0 || longest < 4 * ABOUT {
+        return false;
+    }
+    let at = |k: usize| -> f64 {
+        let turn = TAU * k as f64 / longest as f64;
+        let step = Complex::from_polar(1.0, turn);
+        let of = |log: &Vec<Option<f64>>| {
+            let mut wave = Complex::new(1.0, 0.0);
+            let mut sum = Complex::new(0.0, 0.0);
+            for x in log {
+                sum += wave * x.unwrap_or(0.0);
+                wave *= step;
+            }
+            // The square that a wave of this size has over the log.
+            2.0 * sum.norm_sqr() / log.iter().flatten().count().max(1) as f64
+        };
+        logs.iter().map(of).sum()
+    };
+    let power: Vec<f64> = (0..longest / 2).map(at).collect();
+    let stands_out = |k: usize| {
+        let about = (k - ABOUT.min(k)..(k + ABOUT + 1).min(power.len())).filter(|other| other.abs_diff(k) > OWN);
+        let (sum, count) = about.fold((0.0, 0.0), |(sum, count), other| (sum + power[other], count + 1.0));
+        // Of noise, the sum over n logs is n times a mean of exponential variables: Chernoff's bound of its tail.
+        let times = power[k] / (sum / count);
+        let odds = moved * (times - 1.0 - times.ln()) - (power.len() as f64).ln();
+        times > 1.0 && odds > PRICE_OF_ODD.get() && power[k] > PREDICTED.get() * square
+    };
+    (PERIODS..power.len()).any(stands_out)
 }
 
 #[cfg(test)]
@@ -35,10 +81,14 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
     use rand_pcg::Pcg64;
-    use std::f64::consts::TAU;
 
     fn is_noise(rows: &[f64], predicted: f64) -> bool {
-        noise(rows, predicted).is_some()
+        noise(&[whole(rows)], predicted).is_some()
+    }
+
+    /// A log without a rest.
+    fn whole(rows: &[f64]) -> Vec<Option<f64>> {
+        rows.iter().copied().map(Some).collect()
     }
 
     /// Noise of a minute, each row `memory` of the one before and something new.
@@ -68,6 +118,25 @@ mod tests {
         assert!(!is_noise(&wave, 0.0));
         assert!(!is_noise(&colored(0.0)[..200], 0.0), "a few seconds do not tell");
         assert!(!is_noise(&[0.0; 1500], 0.0));
-        assert!((noise(&coarse, 0.0).unwrap() - 0.5).abs() < 1e-12);
+        assert!((noise(&[whole(&coarse)], 0.0).unwrap() - 0.5).abs() < 1e-12);
+    }
+
+    /// A hum hides from what a moment remembers where a joint rests now and then.
+    #[test]
+    fn a_tone_is_found_among_noise_and_across_rests() {
+        let hums = |size: f64, memory: f64| -> bool {
+            let wave = |i: usize| size * (TAU * i as f64 / 8.3 + 0.3).sin();
+            let rests = |i: usize| i % 100 < 40;
+            let noise = colored(memory);
+            let level = (noise.iter().map(|x| x * x).sum::<f64>() / noise.len() as f64).sqrt();
+            let log: Vec<Option<f64>> =
+                noise.iter().enumerate().map(|(i, x)| (!rests(i)).then(|| x / level + wave(i))).collect();
+            let (first, second) = log.split_at(700);
+            has_tone(&[first.to_vec(), second.to_vec()])
+        };
+        assert!(hums(1.0, 0.0) && hums(1.0, 0.7));
+        assert!(!hums(0.0, 0.0) && !hums(0.0, 0.7) && !hums(0.0, 0.9));
+        assert!(!hums(0.1, 0.0), "a tone too small to matter");
+        assert!(!has_tone(&[]) && !has_tone(&[whole(&[0.0; 1500])]) && !has_tone(&[whole(&[1.0; 10])]));
     }
 }

@@ -23,6 +23,10 @@ const DOTS: usize = 700;
 const STRETCHES: usize = 160;
 /// A law whose values scatter within such a stretch by more than this part of all their spread is no line over the axis.
 const SCATTERED: f64 = 0.25;
+/// A law is no line where its squared steps from point to point are more than this part of its squared spread, ...
+const JAGGED: f64 = 0.25;
+/// ... unless it has fewer points than this: dry friction steps once.
+const FEW: usize = 20;
 /// Dots of all curves together.
 const ALL_DOTS: usize = 40_000;
 
@@ -148,9 +152,15 @@ fn smooth(law: &[[f64; 2]]) -> Vec<[f64; 2]> {
     sums[..STRETCHES].iter().filter(|s| s[3] > 0.0).map(|s| [s[0] / s[3], s[1] / s[3]]).collect()
 }
 
-/// Whether a law that `smooth` has seen is a line over its axis: what scatters keeps all of its points.
+/// Whether a law that `smooth` has seen is a line over its axis: its values hardly change from one point to the next, as parts of
+/// their spread (von Neumann, Ann. Math. Stat. 12(4) 1941). What knows nothing of its neighbours has 2.
 fn is_line(law: &[[f64; 2]]) -> bool {
-    law.len() <= 2 * STRETCHES
+    let mut points: Vec<[f64; 2]> = law.iter().copied().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mean = points.iter().map(|p| p[1]).sum::<f64>() / points.len().max(1) as f64;
+    let spread: f64 = points.iter().map(|p| (p[1] - mean).powi(2)).sum();
+    let steps: f64 = points.windows(2).map(|pair| (pair[1][1] - pair[0][1]).powi(2)).sum();
+    points.len() < FEW || steps <= JAGGED * spread
 }
 
 /// The range that holds all but the outermost two hundredths of the data.
@@ -213,6 +223,10 @@ mod tests {
         let scattered = smooth(&law(&|k| x(k) + (k as f64 * 7.1).sin()));
         assert!(is_line(&blurred) && blurred.len() <= STRETCHES);
         assert!(!is_line(&scattered) && scattered.len() == 1000);
+        // The same of a short log, whose points are too few to be averaged.
+        let few = |law: &[[f64; 2]]| -> Vec<[f64; 2]> { law.iter().copied().step_by(5).collect() };
+        assert!(is_line(&few(&law(&|k| (x(k) - 0.5).signum()))) && !is_line(&few(&scattered)));
+        assert!(is_line(&few(&law(&x))) && is_line(&[[0.0, 1.0], [1.0, -1.0]]) && is_line(&[]));
     }
 
     #[test]

@@ -253,23 +253,26 @@ impl<'a> Study<'a> {
         tried.truncate(if self.through { turning.first.len() } else { FIRST });
         let descended: Vec<(Candidate, f64)> =
             tried.iter().map(|(_, drive, rotor)| self.descend(drive.clone(), *rotor)).collect();
-        if self.through {
-            // Through filters of their own they cannot be held against each other: their exact laws tell them apart.
-            let mut apart: Vec<(Candidate, f64)> = Vec::new();
-            for (drive, rotor) in descended {
-                let near = |(other, _): &(Candidate, f64)| (drive.shape / other.shape).ln().abs() < APART;
-                if !apart.iter().any(near) {
-                    apart.push((drive, rotor));
-                }
-            }
-            return apart.into_iter().filter_map(|(drive, rotor)| self.account(drive, rotor, turning)).collect();
-        }
-        let tried = tried.into_iter().map(|(_, drive, rotor)| (drive, rotor)).chain(descended).map(measured);
-        let first = tried.min_by(|a, b| a.0.total_cmp(&b.0));
+        let both =
+            tried.into_iter().map(|(_, drive, rotor)| (drive, rotor)).chain(descended.iter().cloned()).map(measured);
+        let first = both.min_by(|a, b| a.0.total_cmp(&b.0));
         // To turn what is nowhere near takes most of the time, and it does not come near by it.
         let promises = |(_, drive, rotor): &(f64, Candidate, f64)| self.promises(drive, *rotor);
         let turned = first.filter(promises).map(|(_, drive, rotor)| self.turn(drive, rotor));
-        turned.and_then(|(drive, rotor)| self.account(drive, rotor, turning)).into_iter().collect()
+        if !self.through {
+            return turned.and_then(|(drive, rotor)| self.account(drive, rotor, turning)).into_iter().collect();
+        }
+        // Its own filter is another now. Through filters of their own the valleys cannot be held against each other: their exact
+        // laws tell them apart.
+        let turned = turned.map(|(drive, rotor)| self.turn(drive, rotor));
+        let mut accounts: Vec<Account> = Vec::new();
+        for account in turned.into_iter().chain(descended).filter_map(|(d, rotor)| self.account(d, rotor, turning)) {
+            let near = |other: &Account| (account.drive.shape / other.drive.shape).ln().abs() < APART;
+            if !accounts.iter().any(near) {
+                accounts.push(account);
+            }
+        }
+        accounts
     }
 
     /// A drive as an account, where it is better than a rigid one beyond doubt.

@@ -15,6 +15,9 @@ const ROUNDS: usize = 4;
 /// Fall of the misfit, see [`Problem::misfit`], for which the same effects are looked at again: half a nat.
 const SETTLED: f64 = 1.0;
 
+/// Kinds of a set with their joints.
+type Places = Vec<(Kind, Vec<usize>)>;
+
 impl Record<'_> {
     /// From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
     pub(crate) fn converge(
@@ -27,15 +30,15 @@ impl Record<'_> {
     ) -> Result<Chosen, EffectError> {
         let data = self.data(&noise);
         let mut round = 0;
-        let mut before: Option<(Vec<(Kind, Vec<usize>)>, f64)> = None;
+        let mut before: Option<(Places, f64)> = None;
         let (exact, fit) = loop {
             progress("refining effects", 0.3 + 0.08 * round as f64);
             round += 1;
             let (exact, fit) = data.exact(&all, &choice.set, turned.as_ref())?;
             // The same effects from other places of their grids came to the same parameters.
-            let places = exact.entries.iter().map(|e| (e.candidate.kind, e.candidate.joints.clone())).collect();
+            let places: Places = exact.entries.iter().map(|e| (e.candidate.kind, e.candidate.joints.clone())).collect();
             let now = Some((places, exact.misfit(&fit, &self.band)));
-            let same = |(places, misfit): &(Vec<_>, f64)| {
+            let same = |(places, misfit): &(Places, f64)| {
                 now.as_ref().is_some_and(|(own, left)| own == places && misfit - left < SETTLED)
             };
             if round == ROUNDS || choice.set.is_empty() || before.as_ref().is_some_and(same) {

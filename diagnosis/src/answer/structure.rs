@@ -5,8 +5,7 @@
 //! of one size at all times, a moment later it is forgotten, and it has no tone. A law that the catalogue lacks is none of these.
 
 use crate::numbers::decide::{PREDICTED, PRICE_OF_ODD, REMEMBERED, UNEVEN};
-use nalgebra::Complex;
-use std::f64::consts::TAU;
+use rustfft::{FftPlanner, num_complex::Complex};
 
 /// Rows of a second at the usual cut-off, and the least seconds that tell.
 const SECOND: usize = 25;
@@ -38,7 +37,7 @@ const OWN: usize = 2;
 /// The first frequency, in periods of the longest log: below it noise that falls with frequency is no level.
 const PERIODS: usize = 8;
 
-/// Whether something of one frequency goes on in the logs of a joint, at the rows of each log, 0 where it rests: a part of the
+/// Whether something of one frequency goes on in the logs of a joint, at the rows of each log, nothing where it rests: a part of the
 /// power that matters, at which the periodogram (Schuster 1898) stands out from its neighbours beyond the chance of the best
 /// of all frequencies.
 fn has_tone(logs: &[Vec<Option<f64>>]) -> bool {
@@ -48,22 +47,16 @@ fn has_tone(logs: &[Vec<Option<f64>>]) -> bool {
     if square <= 0.0 || longest < 4 * ABOUT {
         return false;
     }
-    let at = |k: usize| -> f64 {
-        let turn = TAU * k as f64 / longest as f64;
-        let step = Complex::from_polar(1.0, turn);
-        let of = |log: &Vec<Option<f64>>| {
-            let mut wave = Complex::new(1.0, 0.0);
-            let mut sum = Complex::new(0.0, 0.0);
-            for x in log {
-                sum += wave * x.unwrap_or(0.0);
-                wave *= step;
-            }
-            // The square that a wave of this size has over the log.
-            2.0 * sum.norm_sqr() / log.iter().flatten().count().max(1) as f64
-        };
-        logs.iter().map(of).sum()
-    };
-    let power: Vec<f64> = (0..longest / 2).map(at).collect();
+    let fft = FftPlanner::new().plan_fft_forward(longest);
+    // The square that a wave of each frequency has over the logs.
+    let mut power = vec![0.0; longest / 2];
+    for log in logs {
+        let mut spectrum: Vec<Complex<f64>> = log.iter().map(|x| Complex::new(x.unwrap_or(0.0), 0.0)).collect();
+        spectrum.resize(longest, Complex::new(0.0, 0.0));
+        fft.process(&mut spectrum);
+        let rows = log.iter().flatten().count().max(1) as f64;
+        power.iter_mut().zip(&spectrum).for_each(|(power, value)| *power += 2.0 * value.norm_sqr() / rows);
+    }
     let stands_out = |k: usize| {
         let about = (k - ABOUT.min(k)..(k + ABOUT + 1).min(power.len())).filter(|other| other.abs_diff(k) > OWN);
         let (sum, count) = about.fold((0.0, 0.0), |(sum, count), other| (sum + power[other], count + 1.0));
@@ -81,6 +74,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
     use rand_pcg::Pcg64;
+    use std::f64::consts::TAU;
 
     fn is_noise(rows: &[f64], predicted: f64) -> bool {
         noise(&[whole(rows)], predicted).is_some()

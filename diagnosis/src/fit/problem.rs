@@ -12,6 +12,7 @@ use crate::fit::terms::{Entry, Term};
 use crate::record::band::Band;
 use crate::record::frequency::{Equalizer, in_bands};
 use crate::record::known::Known;
+use crate::record::rows::effort_deviation;
 use crate::record::signals::Signals;
 use gapscope_dynamics::Model;
 use gapscope_effects::{Body, Candidate, Column, EncoderSide, Kind};
@@ -168,15 +169,8 @@ impl Problem {
                 }
             });
         }
-        let scale = (0..n)
-            .map(|j| {
-                let efforts = || signals.iter().flat_map(|s| s.tau[j].iter());
-                let count = efforts().count().max(1) as f64;
-                let mean = efforts().sum::<f64>() / count;
-                // What is the same all the time a bias explains exactly.
-                (efforts().map(|tau| (tau - mean).powi(2)).sum::<f64>() / count).sqrt().max(1e-9)
-            })
-            .collect();
+        // What is the same all the time a bias explains exactly.
+        let scale = (0..n).map(|j| effort_deviation(signals, j).max(1e-9)).collect();
         let p = bounds.len();
         let mut fold_of_block = vec![0; band.blocks];
         for row in &band.rows {

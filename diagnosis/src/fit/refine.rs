@@ -24,8 +24,9 @@ const SETTLED_BENT: f64 = 0.1;
 const SETTLED: f64 = 2e-3;
 /// Rounds, at most, where a drive turns on its own: friction behind it comes nearer by a part of the way each time.
 const ROUNDS_OF_TURNING: usize = 20;
-/// Fall of the misfit, see [`Problem::misfit`], for which such an account takes no further step: half a nat.
-const SETTLED_MISFIT: f64 = 1.0;
+/// Fall of the misfit, see [`Problem::misfit`], for which such an account takes no further step, and the same effects are not
+/// looked at again: half a nat.
+pub(crate) const SETTLED_MISFIT: f64 = 1.0;
 /// Times that a step which leaves more than the one before is halved.
 const HALVINGS: usize = 3;
 

@@ -25,13 +25,18 @@ pub fn weights(signals: &[Signals], moving: &[bool]) -> Vec<f64> {
         .iter()
         .enumerate()
         .map(|(j, &moves)| {
-            let all = || signals.iter().flat_map(|s| s.tau[j].iter());
-            let count = all().count().max(1) as f64;
-            let mean = all().sum::<f64>() / count;
-            let deviation = (all().map(|t| (t - mean).powi(2)).sum::<f64>() / count).sqrt();
+            let deviation = effort_deviation(signals, j);
             if moves && deviation > 0.0 { 1.0 / deviation } else { 0.0 }
         })
         .collect()
+}
+
+/// Standard deviation of the effort of a joint over all logs, N m or N.
+pub fn effort_deviation(signals: &[Signals], joint: usize) -> f64 {
+    let all = || signals.iter().flat_map(|s| s.tau[joint].iter());
+    let count = all().count().max(1) as f64;
+    let mean = all().sum::<f64>() / count;
+    (all().map(|t| (t - mean).powi(2)).sum::<f64>() / count).sqrt()
 }
 
 /// Weight of each joint where it is asked whether what is left of it concerns anyone: one over the root mean square of its

@@ -2,6 +2,7 @@
 
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
+use crate::fit::refine::SETTLED_MISFIT;
 use crate::fit::terms::{Entry, Term};
 use crate::record::data::Data;
 use crate::record::logs::{Progress, Record};
@@ -12,8 +13,6 @@ use gapscope_effects::{Candidate, EffectError, Kind};
 
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
-/// Fall of the misfit, see [`Problem::misfit`], for which the same effects are looked at again: half a nat.
-const SETTLED: f64 = 1.0;
 
 /// Kinds of a set with their joints.
 type Places = Vec<(Kind, Vec<usize>)>;
@@ -39,7 +38,7 @@ impl Record<'_> {
             let places: Places = exact.entries.iter().map(|e| (e.candidate.kind, e.candidate.joints.clone())).collect();
             let now = Some((places, exact.misfit(&fit, &self.band)));
             let same = |(places, misfit): &(Places, f64)| {
-                now.as_ref().is_some_and(|(own, left)| own == places && misfit - left < SETTLED)
+                now.as_ref().is_some_and(|(own, left)| own == places && misfit - left < SETTLED_MISFIT)
             };
             if round == ROUNDS || choice.set.is_empty() || before.as_ref().is_some_and(same) {
                 break (exact, fit);

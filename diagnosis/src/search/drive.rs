@@ -192,8 +192,7 @@ impl<'a> Study<'a> {
                 noisier(s, run, s.position_noise[joint], white(s), seed)
             })
             .collect();
-        let efforts: Vec<f64> = logs.signals.iter().flat_map(|s| s.tau[joint].iter().copied()).collect();
-        study.unnoticed = UNNOTICED.get().powi(2) * (mean_square(&efforts) - mean(&efforts).powi(2)).max(0.0);
+        study.unnoticed = (UNNOTICED.get() * rows::effort_deviation(&logs.signals, joint)).powi(2);
         study.rigid = study.rigid_in(View::default());
         study.rotor = study.turn(rigid, study.rotor).1;
         study.rigid = study.rigid_in(View::default());

@@ -48,9 +48,12 @@ impl Record<'_> {
         // What they leave counts as a hint: noise is in it.
         let hint = rival.odds_against(&chosen, self)?.clamp(-told.hint, told.hint);
         let odds = self.odds_of_the_second([&chosen, &rival], &told)? + hint;
-        let told = if odds <= 0.0 { [(chosen, other), (rival, lost)] } else { [(rival, lost), (chosen, other)] };
+        let mut both = [(chosen, other), (rival, lost)];
+        if odds > 0.0 {
+            both.reverse();
+        }
+        let [(mut likelier, mut lost), (second, first)] = both;
         let mut doubt = 1.0 / (1.0 + odds.abs().exp());
-        let [(mut likelier, mut lost), (second, first)] = told;
         // The instrument takes one of the two to be there. One that is not likelier than none of them is not.
         let mut set = likelier.choice.set.clone();
         set.retain(|&c| !likelier.all.entries[c].candidate.kind.card().is_late());

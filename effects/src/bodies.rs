@@ -16,31 +16,44 @@ const BALL: (f64, f64) = (1e-3, 0.03);
 /// Halvings towards the largest part of a payload that leaves its link a body.
 const HALVINGS: usize = 40;
 
-/// Moves link errors and payloads as little as makes a body of every link, and of every link with what it carries.
+/// Moves link errors and payloads as little as makes a body of every link, and of every link with what it carries. A load that is
+/// missing is at most what the link has; beside an error of the link, the sum of the two is kept.
 pub fn keep_bodies(model: &Model, effects: &mut [Effect]) {
     for (j, joint) in model.joints().iter().enumerate() {
         let (nominal, unit) = reference(model, j);
         // A load that is missing leaves a body; one that is there is a body of its own.
         let mut link = nominal;
+        // What a load gives up, the link's own error takes: together they stay what was fitted.
+        let mut given_up = [0.0; 10];
         for effect in effects.iter_mut() {
             if let Effect::Payload(payload) = effect
                 && payload.joint == joint.name
                 && payload.mass < 0.0
             {
+                let whole = payload.link_inertia().parameters();
                 lighten(payload, &link, &unit);
-                link = link.add(&payload.link_inertia());
+                let kept = payload.link_inertia();
+                link = link.add(&kept);
+                let kept = kept.parameters();
+                (0..10).for_each(|i| given_up[i] += whole[i] - kept[i]);
             }
         }
         for effect in effects.iter_mut() {
             if let Effect::LinkInertiaError(error) = effect
                 && error.joint == joint.name
-                && let Some(body) = raised(&link.add(&Inertia::from_parameters(&error.coefficients())), &unit)
             {
-                let (body, link) = (body.parameters(), link.parameters());
-                let left: [f64; 10] = std::array::from_fn(|i| body[i] - link[i]);
-                error.mass_delta = left[0];
-                error.first_moment_delta = [left[1], left[2], left[3]];
-                error.inertia_delta = [left[4], left[5], left[6], left[7], left[8], left[9]];
+                let wished: [f64; 10] = std::array::from_fn(|i| error.coefficients()[i] + given_up[i]);
+                let told = match raised(&link.add(&Inertia::from_parameters(&wished)), &unit) {
+                    Some(body) => {
+                        let (body, link) = (body.parameters(), link.parameters());
+                        std::array::from_fn(|i| body[i] - link[i])
+                    }
+                    None => wished,
+                };
+                given_up = [0.0; 10];
+                error.mass_delta = told[0];
+                error.first_moment_delta = [told[1], told[2], told[3]];
+                error.inertia_delta = [told[4], told[5], told[6], told[7], told[8], told[9]];
             }
         }
     }
@@ -200,6 +213,37 @@ mod tests {
                 effects.push(Effect::Payload(load));
                 keep_bodies(&model, &mut effects);
                 assert!(links(&model, &effects).iter().all(Inertia::is_physical), "{name}: {effects:?}");
+            }
+        }
+    }
+
+    /// Load and link are told apart by their prior alone: what is fitted of the two together stays.
+    #[test]
+    fn a_load_that_no_link_can_lack_keeps_its_sum_with_the_error_of_the_link() {
+        let model = robots::model("arm7").unwrap().unwrap().model;
+        let last = model.joints().last().unwrap();
+        let mass = -0.7 * last.inertia.mass;
+        // Farther out than the link reaches.
+        let load = Payload { joint: last.name.clone(), mass, com: [0.0, 0.0, 0.4], inertia: [0.0; 6] };
+        let lacks = load.link_inertia().parameters();
+        let link = last.inertia.parameters();
+        // The sum is half the link.
+        let error: [f64; 10] = std::array::from_fn(|i| -0.5 * link[i] - lacks[i]);
+        let error = LinkInertiaError {
+            joint: last.name.clone(),
+            mass_delta: error[0],
+            first_moment_delta: [error[1], error[2], error[3]],
+            inertia_delta: [error[4], error[5], error[6], error[7], error[8], error[9]],
+        };
+        for order in [[0, 1], [1, 0]] {
+            let both = [Effect::Payload(load.clone()), Effect::LinkInertiaError(error.clone())];
+            let mut effects: Vec<Effect> = order.iter().map(|&i| both[i].clone()).collect();
+            keep_bodies(&model, &mut effects);
+            let Effect::Payload(kept) = &effects[order[0]] else { unreachable!() };
+            assert!(kept.mass > 0.9 * mass, "{kept:?}");
+            let whole = links(&model, &effects).pop().unwrap().parameters();
+            for (whole, link) in whole.iter().zip(link) {
+                assert!((whole - 0.5 * link).abs() < 1e-9, "{whole} {link}");
             }
         }
     }

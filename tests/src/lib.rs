@@ -16,6 +16,11 @@ pub fn robot(name: &str) -> Model {
     robots::model(name).expect("a built-in robot").expect("it loads").model
 }
 
+/// How a validation logs where nothing else is asked: 10 s at 250 Hz, half the usual rate, as its time goes with the rows.
+pub fn recipe() -> Recipe {
+    Recipe { rate: 250.0, ..Recipe::default() }
+}
+
 /// A log of the robot with `effects` under computed torque, encoder noise of `noise` rad or m.
 ///
 /// # Panics

@@ -5,6 +5,7 @@ use super::sample::Sample;
 use crate::robust::rms;
 use gapscope_dynamics::{Data, Model};
 use nalgebra::{DMatrix, DVector};
+use std::borrow::Cow;
 
 /// What lies below this share of the effort's variance is no evidence: no robot is known that well.
 const FLOOR: f64 = 3e-4;
@@ -85,11 +86,12 @@ impl Weighed {
 
 /// Weighs an account by the likelier of two robots: a used one, and one that has been used long.
 pub(crate) fn weigh_either(model: &Model, sample: &Sample, scale: &[f64], active: &[bool]) -> Weighed {
-    let ordinary = weigh(model, sample, scale, active, Freedom::ORDINARY);
+    let account = Rows::new(model, sample, scale, active);
+    let ordinary = account.weigh(Freedom::ORDINARY);
     if ordinary.is_plain(active) {
         return ordinary;
     }
-    let mut worn = weigh(model, sample, scale, active, Freedom::WORN);
+    let mut worn = account.weigh(Freedom::WORN);
     worn.score -= WORN;
     if worn.score > ordinary.score { worn } else { ordinary }
 }
@@ -97,125 +99,177 @@ pub(crate) fn weigh_either(model: &Model, sample: &Sample, scale: &[f64], active
 /// Weighs an account: `scale[j]` is what the effort of joint j was multiplied by when it was logged. Joints that are not
 /// `active` have no say.
 pub(crate) fn weigh(model: &Model, sample: &Sample, scale: &[f64], active: &[bool], freedom: Freedom) -> Weighed {
-    let n = model.dof();
-    // Places of a silent log have a prediction and no say.
-    let heard: Vec<usize> = (0..sample.len()).filter(|&k| sample.silent != Some(sample.log[k])).collect();
-    let places = heard.len();
-    let width = 10 * n + OWN * n;
-    let torque = sample.torque(model);
-    let target: Vec<Vec<f64>> =
-        (0..n).map(|j| sample.effort[j].iter().map(|effort| effort / scale[j]).collect()).collect();
-    let most = torque.iter().map(|row| rms(row)).fold(0.0, f64::max);
-    let level: Vec<f64> = (0..n).map(|j| level(model, j, &torque[j], most, scale[j])).collect();
-    let slow: Vec<f64> = sample.v.iter().map(|v| 0.1 * rms(v)).collect();
-    let columns = |j: usize, k: usize, row: &mut [f64]| {
-        let v = sample.v[j][k];
-        let dry = if slow[j] > 0.0 { (v / slow[j]).tanh() } else { 0.0 };
-        row[10 * n + OWN * j..][..OWN].copy_from_slice(&[1.0, v, dry, sample.a[j][k], torque[j][k]]);
-    };
-    // Normal equations joint by joint, so that the joints can be weighed against each other afterwards.
-    let mut normal = vec![DMatrix::<f64>::zeros(width, width); n];
-    let mut right = vec![DVector::<f64>::zeros(width); n];
-    let mut squares = vec![0.0; n];
-    let mut bodies = DMatrix::zeros(n, 10 * n);
-    let mut data = Data::new(model);
-    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    let mut rows = vec![vec![0.0; width * sample.len()]; n];
-    for k in 0..sample.len() {
-        for j in 0..n {
-            (q[j], v[j], a[j]) = (sample.q[j][k], sample.v[j][k], sample.a[j][k]);
-        }
-        model.regressor(&mut data, &q, &v, &a, &mut bodies);
-        for j in (0..n).filter(|&j| active[j]) {
-            let row = &mut rows[j][width * k..][..width];
-            row[..10 * n].iter_mut().enumerate().for_each(|(i, x)| *x = bodies[(j, i)]);
-            columns(j, k, row);
-        }
+    Rows::new(model, sample, scale, active).weigh(freedom)
+}
+
+/// The effort of one joint at all places, linear in the columns that it knows: those of the links that it carries and its own.
+struct Row {
+    joint: usize,
+    /// Its columns among all of them; its own [`OWN`] are the last.
+    columns: Vec<usize>,
+    /// (columns, places).
+    table: DMatrix<f64>,
+    /// Normal equations of the places that have a say.
+    normal: DMatrix<f64>,
+    right: DVector<f64>,
+    /// Sum of squares of what the description leaves.
+    square: f64,
+    /// Variance of the effort.
+    variance: f64,
+}
+
+impl Row {
+    /// Its part of a solution for all columns.
+    fn part(&self, solution: &DVector<f64>) -> DVector<f64> {
+        DVector::from_iterator(self.columns.len(), self.columns.iter().map(|&i| solution[i]))
     }
-    for j in (0..n).filter(|&j| active[j]) {
-        let column = |&k: &usize| rows[j][width * k..][..width].iter().copied();
-        let table = DMatrix::from_iterator(width, places, heard.iter().flat_map(column));
-        let left = DVector::from_iterator(places, heard.iter().map(|&k| target[j][k] - torque[j][k]));
-        normal[j] = &table * table.transpose();
-        right[j] = &table * &left;
-        squares[j] = left.norm_squared();
-    }
-    let mut prior = prior(model, sample, &level, freedom);
-    let ordinary = prior.clone();
-    let variance: Vec<f64> = target.iter().map(|y| spread(&heard.iter().map(|&k| y[k]).collect::<Vec<_>>())).collect();
-    let independent = independent(places);
-    // Rows count as fewer where they are not independent.
-    let worth = independent / places.max(1) as f64;
-    let mut noise: Vec<f64> = variance.iter().map(|v| (0.1 * v).max(1e-300)).collect();
-    let mut solution = DVector::zeros(width);
-    let mut last = None;
-    let mut unexplained = vec![1.0; n];
-    for _ in 0..ROUNDS {
-        let mut sum = DMatrix::from_diagonal(&DVector::from_iterator(width, prior.iter().map(|s| s.powi(-2))));
-        let mut b = DVector::zeros(width);
-        for j in (0..n).filter(|&j| active[j]) {
-            sum += &normal[j] * (worth / noise[j]);
-            b += &right[j] * (worth / noise[j]);
-        }
-        // Scaled by the prior the matrix is at least the identity.
-        let size = DVector::from_vec(prior.clone());
-        for (mut column, s) in sum.column_iter_mut().zip(&size) {
-            column.component_mul_assign(&size);
-            column *= *s;
-        }
-        let Some(factor) = sum.cholesky() else { break };
-        solution = factor.solve(&b.component_mul(&size)).component_mul(&size);
-        last = Some(factor);
-        keep_to_physics(model, &solution, &ordinary, &mut prior, freedom);
-        for j in (0..n).filter(|&j| active[j]) {
-            let left = squares[j] - 2.0 * solution.dot(&right[j]) + solution.dot(&(&normal[j] * &solution));
-            let share = left.max(0.0) / places.max(1) as f64 / variance[j].max(1e-300);
-            unexplained[j] = if share.is_finite() { share.max(freedom.floor) } else { 1e3 };
-            noise[j] = unexplained[j] * variance[j].max(1e-300);
-        }
-    }
-    let inverse = last.map_or_else(|| DMatrix::zeros(0, 0), |factor| factor.inverse());
-    let asked: f64 = solution.iter().zip(&prior).map(|(x, s)| 0.5 * (x / s).powi(2)).sum();
-    let likelihood: f64 = (0..n).filter(|&j| active[j]).map(|j| -0.5 * independent * unexplained[j].ln()).sum();
-    let gain_at = |j: usize| 10 * n + OWN * j + 4;
-    let error = |j: usize| inverse.get((gain_at(j), gain_at(j))).map_or(1.0, |x| x.max(0.0).sqrt() * freedom.gain);
-    let predicted = (0..n).map(|j| {
-        let at = |k: usize| {
-            let row = &rows[j][width * k..][..width];
-            torque[j][k] + row.iter().zip(solution.iter()).map(|(x, p)| x * p).sum::<f64>()
+}
+
+/// An account as a linear fit, whatever the freedom.
+struct Rows<'a> {
+    model: &'a Model,
+    sample: &'a Sample,
+    /// What the description takes, joint-major.
+    torque: Vec<Vec<f64>>,
+    level: Vec<f64>,
+    /// Active joints.
+    rows: Vec<Row>,
+    /// Places that have a say.
+    places: usize,
+}
+
+impl<'a> Rows<'a> {
+    fn new(model: &'a Model, sample: &'a Sample, scale: &[f64], active: &[bool]) -> Rows<'a> {
+        let n = model.dof();
+        // Places of a silent log have a prediction and no say.
+        let heard: Vec<usize> = (0..sample.len()).filter(|&k| sample.silent != Some(sample.log[k])).collect();
+        let torque = sample.torque(model);
+        let most = torque.iter().map(|row| rms(row)).fold(0.0, f64::max);
+        let level = (0..n).map(|j| level(model, j, &torque[j], most, scale[j])).collect();
+        let columns = |j: usize| {
+            let bodies = (0..n).filter(|&link| carries(model, j, link)).flat_map(|link| 10 * link..10 * link + 10);
+            bodies.chain(10 * n + OWN * j..10 * n + OWN * (j + 1)).collect::<Vec<_>>()
         };
-        (0..sample.len()).map(at).collect()
-    });
-    // Without what friction and bias take: the first three of the joint's own columns.
-    let inertia = |j: usize| {
-        let friction = 10 * n + OWN * j..10 * n + OWN * j + 3;
-        let (mut sum, mut size) = (0.0, 0.0);
-        for (row, torque) in rows[j].chunks_exact(width).zip(&torque[j]) {
-            let further = row.iter().zip(solution.iter()).enumerate();
-            let further: f64 = further.filter(|(i, _)| !friction.contains(i)).map(|(_, (x, p))| x * p).sum();
-            (sum, size) = (sum + (torque + further) * torque, size + torque * torque);
+        let mut tables: Vec<(usize, Vec<usize>, DMatrix<f64>)> = (0..n)
+            .filter(|&j| active[j])
+            .map(|j| (j, columns(j)))
+            .map(|(j, columns)| (j, columns.clone(), DMatrix::zeros(columns.len(), sample.len())))
+            .collect();
+        let mut bodies = DMatrix::zeros(n, 10 * n);
+        let mut data = Data::new(model);
+        let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let slow: Vec<f64> = sample.v.iter().map(|v| 0.1 * rms(v)).collect();
+        for k in 0..sample.len() {
+            for j in 0..n {
+                (q[j], v[j], a[j]) = (sample.q[j][k], sample.v[j][k], sample.a[j][k]);
+            }
+            model.regressor(&mut data, &q, &v, &a, &mut bodies);
+            for (j, columns, table) in &mut tables {
+                let (j, mut row) = (*j, table.column_mut(k));
+                let links = columns.len() - OWN;
+                row.iter_mut().zip(&columns[..links]).for_each(|(x, &i)| *x = bodies[(j, i)]);
+                let dry = if slow[j] > 0.0 { (v[j] / slow[j]).tanh() } else { 0.0 };
+                row.rows_mut(links, OWN).copy_from_slice(&[1.0, v[j], dry, a[j], torque[j][k]]);
+            }
         }
-        if active[j] && size > 0.0 { (sum, size) } else { (1.0, 1.0) }
-    };
-    let inertia: Vec<(f64, f64)> = (0..n).map(inertia).collect();
-    let (sum, size) =
-        (0..n).filter(|&j| active[j]).fold((0.0, 0.0), |all, j| (all.0 + inertia[j].0, all.1 + inertia[j].1));
-    let described: f64 = model.joints().iter().map(|joint| joint.inertia.mass.abs()).sum();
-    let further: f64 = (0..n).map(|j| solution[10 * j]).sum();
-    let gains: Vec<f64> = (0..n).filter(|&j| active[j]).map(|j| 1.0 + solution[gain_at(j)]).collect();
-    let mean_gain = gains.iter().sum::<f64>() / gains.len().max(1) as f64;
-    Weighed {
-        score: likelihood - asked,
-        mass: (1.0 + further / described.max(1e-9)) * mean_gain,
-        inertia: inertia.iter().map(|(sum, size)| sum / size).collect(),
-        torque: if size > 0.0 { sum / size } else { 1.0 },
-        asked,
-        unexplained,
-        gain: (0..n).map(|j| 1.0 + solution[gain_at(j)]).collect(),
-        gain_error: (0..n).map(error).collect(),
-        narrowed: (0..width).map(|i| inverse.get((i, i)).map_or(1.0, |x| x.max(0.0).sqrt())).collect(),
-        predicted: predicted.collect(),
+        let row = |(joint, columns, table): (usize, Vec<usize>, DMatrix<f64>)| {
+            let target: Vec<f64> = heard.iter().map(|&k| sample.effort[joint][k] / scale[joint]).collect();
+            let left = heard.iter().zip(&target).map(|(&k, effort)| effort - torque[joint][k]);
+            let left = DVector::from_iterator(heard.len(), left);
+            let all = heard.len() == sample.len();
+            let told = if all { Cow::Borrowed(&table) } else { Cow::Owned(table.select_columns(&heard)) };
+            let (normal, right) = (&*told * told.transpose(), &*told * &left);
+            let (square, variance) = (left.norm_squared(), spread(&target));
+            drop(told);
+            Row { joint, columns, table, normal, right, square, variance }
+        };
+        let rows = tables.into_iter().map(row).collect();
+        Rows { model, sample, torque, level, rows, places: heard.len() }
     }
+
+    fn weigh(&self, freedom: Freedom) -> Weighed {
+        let (model, n, places) = (self.model, self.model.dof(), self.places);
+        let width = 10 * n + OWN * n;
+        let mut prior = prior(model, self.sample, &self.level, freedom);
+        let ordinary = prior.clone();
+        let independent = independent(places);
+        // Rows count as fewer where they are not independent.
+        let worth = independent / places.max(1) as f64;
+        let mut noise: Vec<f64> = self.rows.iter().map(|row| (0.1 * row.variance).max(1e-300)).collect();
+        let mut solution = DVector::zeros(width);
+        let mut last = None;
+        let mut unexplained = vec![1.0; n];
+        for _ in 0..ROUNDS {
+            let mut sum = DMatrix::from_diagonal(&DVector::from_iterator(width, prior.iter().map(|s| s.powi(-2))));
+            let mut b = DVector::zeros(width);
+            for (row, noise) in self.rows.iter().zip(&noise) {
+                let weight = worth / noise;
+                for (from, &i) in row.columns.iter().enumerate() {
+                    b[i] += weight * row.right[from];
+                    row.columns.iter().enumerate().for_each(|(to, &k)| sum[(k, i)] += weight * row.normal[(to, from)]);
+                }
+            }
+            // Scaled by the prior the matrix is at least the identity.
+            let size = DVector::from_vec(prior.clone());
+            for (mut column, s) in sum.column_iter_mut().zip(&size) {
+                column.component_mul_assign(&size);
+                column *= *s;
+            }
+            let Some(factor) = sum.cholesky() else { break };
+            solution = factor.solve(&b.component_mul(&size)).component_mul(&size);
+            last = Some(factor);
+            keep_to_physics(model, &solution, &ordinary, &mut prior, freedom);
+            for (row, noise) in self.rows.iter().zip(&mut noise) {
+                let part = row.part(&solution);
+                let left = row.square - 2.0 * part.dot(&row.right) + part.dot(&(&row.normal * &part));
+                let share = left.max(0.0) / places.max(1) as f64 / row.variance.max(1e-300);
+                let share = if share.is_finite() { share.max(freedom.floor) } else { 1e3 };
+                unexplained[row.joint] = share;
+                *noise = share * row.variance.max(1e-300);
+            }
+        }
+        let inverse = last.map_or_else(|| DMatrix::zeros(0, 0), |factor| factor.inverse());
+        let asked: f64 = solution.iter().zip(&prior).map(|(x, s)| 0.5 * (x / s).powi(2)).sum();
+        let likelihood: f64 = self.rows.iter().map(|row| -0.5 * independent * unexplained[row.joint].ln()).sum();
+        let gain_at = |j: usize| 10 * n + OWN * j + 4;
+        let error = |j: usize| inverse.get((gain_at(j), gain_at(j))).map_or(1.0, |x| x.max(0.0).sqrt() * freedom.gain);
+        let mut predicted = self.torque.clone();
+        // Without what friction and bias take: the first three of the joint's own columns.
+        let mut inertia = vec![(1.0, 1.0); n];
+        let (mut sum, mut size) = (0.0, 0.0);
+        for row in &self.rows {
+            let (j, torque, mut part) = (row.joint, &self.torque[row.joint], row.part(&solution));
+            let further = row.table.tr_mul(&part);
+            predicted[j].iter_mut().zip(&further).for_each(|(torque, further)| *torque += further);
+            part.rows_mut(row.columns.len() - OWN, 3).fill(0.0);
+            let further = row.table.tr_mul(&part);
+            let torque_of_motion = torque.iter().zip(&further).map(|(torque, further)| (torque + further) * torque);
+            let of_joint = (torque_of_motion.sum::<f64>(), torque.iter().map(|x| x * x).sum::<f64>());
+            inertia[j] = if of_joint.1 > 0.0 { of_joint } else { (1.0, 1.0) };
+            (sum, size) = (sum + inertia[j].0, size + inertia[j].1);
+        }
+        let described: f64 = model.joints().iter().map(|joint| joint.inertia.mass.abs()).sum();
+        let further: f64 = (0..n).map(|j| solution[10 * j]).sum();
+        let gains: Vec<f64> = self.rows.iter().map(|row| 1.0 + solution[gain_at(row.joint)]).collect();
+        let mean_gain = gains.iter().sum::<f64>() / gains.len().max(1) as f64;
+        Weighed {
+            score: likelihood - asked,
+            mass: (1.0 + further / described.max(1e-9)) * mean_gain,
+            inertia: inertia.iter().map(|(sum, size)| sum / size).collect(),
+            torque: if size > 0.0 { sum / size } else { 1.0 },
+            asked,
+            unexplained,
+            gain: (0..n).map(|j| 1.0 + solution[gain_at(j)]).collect(),
+            gain_error: (0..n).map(error).collect(),
+            narrowed: (0..width).map(|i| inverse.get((i, i)).map_or(1.0, |x| x.max(0.0).sqrt())).collect(),
+            predicted,
+        }
+    }
+}
+
+/// Whether joint `j` moves `link`.
+fn carries(model: &Model, j: usize, link: usize) -> bool {
+    std::iter::successors(Some(link), |&link| model.joints()[link].parent).any(|link| link == j)
 }
 
 /// Friction and rotors take torque, they give none, and what hangs on the last link has a mass: where a solution says

@@ -84,24 +84,22 @@ fn effort_in_another_unit_or_of_the_other_sign() {
 
 #[test]
 fn positions_in_another_unit_of_the_other_sign_or_from_another_zero() {
-    for name in ROBOTS {
+    let degrees = 180.0 / PI;
+    for (name, factor) in ROBOTS.into_iter().zip([100.0, degrees, 65536.0 / (2.0 * PI)]) {
         let model = built_in(name);
         let n = model.dof();
         let all: Vec<usize> = (0..n).collect();
-        let degrees = 180.0 / PI;
         let without_velocity = |log: &mut Episode| log.velocity = None;
         let faults = found(&model, 1, |log| {
             without_velocity(log);
             log.position.iter_mut().for_each(|x| times(x, degrees));
         });
         only(&faults, FaultKind::PositionScale, names(&model, &all), Some(degrees));
-        for factor in [degrees, 65536.0 / (2.0 * PI), 100.0] {
-            let faults = found(&model, 2, |log| {
-                without_velocity(log);
-                times(&mut log.position[1], factor);
-            });
-            only(&faults, FaultKind::PositionScale, names(&model, &[1]), Some(factor));
-        }
+        let faults = found(&model, 2, |log| {
+            without_velocity(log);
+            times(&mut log.position[1], factor);
+        });
+        only(&faults, FaultKind::PositionScale, names(&model, &[1]), Some(factor));
         let faults = found(&model, 3, |log| {
             without_velocity(log);
             times(&mut log.position[1], -1.0);

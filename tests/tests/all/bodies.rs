@@ -3,7 +3,7 @@
 use gapscope_datasets::{Perturbation, Recipe, Sensors, generate};
 use gapscope_diagnosis::schema::Combination;
 use gapscope_effects::Effect;
-use gapscope_tests::{diagnose, robot};
+use gapscope_tests::{diagnose, recipe, robot};
 use std::collections::BTreeMap;
 
 /// Differences of every link from its URDF, under the names of combinations.
@@ -27,10 +27,10 @@ fn differences(effects: &[Effect]) -> BTreeMap<String, f64> {
 fn sums_over_links_hold_the_truth_where_single_links_do_not() {
     let model = robot("arm6");
     let (mut told, mut held, mut differ) = (0, 0, 0);
-    for seed in 0..4 {
+    for seed in 0..2 {
         let effects = Perturbation::scaled(2.0).draw(&model, seed);
         let sensors = Sensors { position_noise: 2e-5, ..Sensors::default() };
-        let recipe = Recipe { sensors, ..Recipe::default() };
+        let recipe = Recipe { sensors, ..recipe() };
         let log = |i: u64| generate(&model, &effects, 10 * seed + i, &recipe, "log.csv").unwrap();
         let truth = differences(&effects);
         let found: Vec<Combination> = diagnose(&model, &[log(0), log(1), log(2)]).diagnosis.combinations;
@@ -43,7 +43,7 @@ fn sums_over_links_hold_the_truth_where_single_links_do_not() {
         }
     }
     println!("{held} of {told} sums hold the truth, {differ} differ from the URDF");
-    assert!(told >= 30 && differ >= told / 2, "{differ} of {told}");
-    // Of thirty sums of 95 % intervals, fewer than these hold with less than 1 %.
-    assert!(held as f64 >= 0.87 * told as f64, "{held} of {told}");
+    assert!(told >= 15 && differ >= told / 2, "{differ} of {told}");
+    // Of fifteen sums of 95 % intervals, fewer than these hold with less than 1 %.
+    assert!(held as f64 >= 0.8 * told as f64, "{held} of {told}");
 }

@@ -3,7 +3,7 @@
 use gapscope_datasets::{Recipe, Sensors, generate};
 use gapscope_diagnosis::schema::{Parameter, Quantity, Verdict};
 use gapscope_effects::{Effect, StribeckFriction};
-use gapscope_tests::{diagnose, robot};
+use gapscope_tests::{diagnose, recipe, robot};
 use std::collections::BTreeMap;
 
 #[test]
@@ -15,8 +15,7 @@ fn static_friction_is_what_a_wrist_holds_at_rest() {
     let friction =
         StribeckFriction { coulomb: on([0.28, 0.05]), r#static: on([0.6, 0.11]), stribeck_velocity: on([0.12; 2]) };
     let effects = [Effect::StribeckFriction(friction.clone())];
-    let logs: Vec<_> =
-        (1..5).map(|seed| generate(&model, &effects, seed, &Recipe::default(), "log.csv").unwrap()).collect();
+    let logs: Vec<_> = (1..5).map(|seed| generate(&model, &effects, seed, &recipe(), "log.csv").unwrap()).collect();
     let diagnosis = diagnose(&model, &logs).diagnosis;
     let found = &diagnosis.effects;
     assert!(found.len() == 1 && found[0].kind == "stribeck_friction", "{found:#?}");
@@ -42,7 +41,7 @@ fn named(first: usize, coulomb: &[f64], rise: f64, velocity: f64, noise: (f64, f
     let speeds = on(1.0).into_keys().map(|name| (name, velocity)).collect();
     let friction = StribeckFriction { coulomb: on(1.0), r#static: on(rise), stribeck_velocity: speeds };
     let sensors = Sensors { position_noise: noise.0, effort_noise: noise.1, ..Sensors::IDEAL };
-    let recipe = Recipe { sensors, ..Recipe::default() };
+    let recipe = Recipe { sensors, ..recipe() };
     let effects = [Effect::StribeckFriction(friction)];
     let logs: Vec<_> = (1..4).map(|seed| generate(&model, &effects, seed, &recipe, "log.csv").unwrap()).collect();
     let diagnosis = diagnose(&model, &logs).diagnosis;

@@ -3,13 +3,13 @@
 use gapscope_datasets::{Recipe, Sensors, generate};
 use gapscope_diagnosis::schema::FoundEffect;
 use gapscope_effects::{ActuationDelay, ActuatorLag, Effect};
-use gapscope_tests::{diagnose, robot};
+use gapscope_tests::{diagnose, recipe, robot};
 
 /// What is found in an arm's logs with noisy effort.
 fn found(effect: &Effect, position_noise: f64) -> Vec<FoundEffect> {
     let model = robot("arm6");
     let sensors = Sensors { position_noise, effort_noise: 0.01, ..Sensors::default() };
-    let recipe = Recipe { sensors, ..Recipe::default() };
+    let recipe = Recipe { sensors, ..recipe() };
     let logs: Vec<_> =
         (1..5).map(|seed| generate(&model, std::slice::from_ref(effect), seed, &recipe, "log.csv").unwrap()).collect();
     diagnose(&model, &logs).diagnosis.effects

@@ -1,10 +1,10 @@
 //! Friction that grows with the load, where dry friction outweighs all else that a joint does.
 
-use gapscope_datasets::{Recipe, generate};
+use gapscope_datasets::generate;
 use gapscope_diagnosis::schema::{Diagnosis, Verdict};
 use gapscope_dynamics::Model;
 use gapscope_effects::{Armature, CoulombFriction, Effect, JointCoupling, LoadDependentFriction, PreslidingFriction};
-use gapscope_tests::{diagnose, robot};
+use gapscope_tests::{diagnose, recipe, robot};
 use std::collections::BTreeMap;
 
 /// Values on the joints from the `first` on.
@@ -13,7 +13,7 @@ fn on(model: &Model, first: usize, values: &[f64]) -> BTreeMap<String, f64> {
 }
 
 fn diagnosed(model: &Model, effects: &[Effect], seeds: std::ops::Range<u64>) -> Diagnosis {
-    let log = |seed| generate(model, effects, seed, &Recipe::default(), "log.csv").unwrap();
+    let log = |seed| generate(model, effects, seed, &recipe(), "log.csv").unwrap();
     diagnose(model, &seeds.map(log).collect::<Vec<_>>()).diagnosis
 }
 

@@ -5,7 +5,7 @@ use gapscope_datasets::{Episode, Recipe, Sensors, generate};
 use gapscope_diagnosis::schema::{Diagnosis, Verdict};
 use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{ActuationDelay, Armature, Backlash, Effect, ViscousFriction};
-use gapscope_tests::{diagnose, robot};
+use gapscope_tests::{diagnose, recipe, robot};
 use nalgebra::DMatrix;
 
 /// Torque that a law takes of the drives, from q and q̇.
@@ -40,7 +40,7 @@ fn diagnosed(effects: &[Effect], law: &Law) -> Diagnosis {
 fn diagnosed_with(effects: &[Effect], law: &Law, sensors: Sensors) -> Diagnosis {
     let model = robot(ROBOT);
     let n = model.dof();
-    let recipe = Recipe { sensors, ..Recipe::default() };
+    let recipe = Recipe { sensors, ..recipe() };
     let log = |seed| -> Episode {
         let mut log = generate(&model, effects, seed, &recipe, "log.csv").unwrap();
         for k in 1..log.len() - 1 {

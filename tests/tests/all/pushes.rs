@@ -3,7 +3,7 @@
 use gapscope_datasets::{Episode, Recipe, Sensors, generate};
 use gapscope_diagnosis::schema::Verdict;
 use gapscope_effects::{CoulombFriction, Effect, ExternalContact, ViscousFriction};
-use gapscope_tests::{diagnose, robot};
+use gapscope_tests::{diagnose, recipe, robot};
 use std::collections::BTreeMap;
 
 #[test]
@@ -18,7 +18,7 @@ fn a_push_off_the_centre_of_the_hand_is_no_torque_gain() {
     ];
     let (force, offset) = ([12.2, -5.6, -2.7], [0.008, 0.004, -0.02]);
     let sensors = Sensors { position_noise: 5e-6, effort_noise: 0.01, ..Sensors::default() };
-    let recipe = Recipe { sensors, ..Recipe::default() };
+    let recipe = Recipe { sensors, ..recipe() };
     let log = |seed: u64| -> Episode {
         let from = 1.0 + 0.7 * seed as f64;
         let link = model.joints()[6].link.clone();

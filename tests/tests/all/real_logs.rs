@@ -157,6 +157,7 @@ fn kinova_gen3_shrinks() {
 }
 
 #[test]
+#[ignore = "all runs together take minutes: cargo test -p gapscope-tests -- --ignored double_pendulum"]
 fn double_pendulum_shrinks() {
     shrinks("double_pendulum", "");
 }
@@ -169,7 +170,7 @@ fn single_runs_of_the_double_pendulum_shrink() {
 }
 
 #[test]
-#[ignore = "a log of 74 s takes a minute: cargo test -p gapscope-tests -- --ignored a_long_run"]
+#[ignore = "a log of 74 s takes a minute: cargo test -p gapscope-tests -- --ignored double_pendulum"]
 fn a_long_run_of_the_double_pendulum_shrinks() {
     shrinks("double_pendulum", "slow_74s");
 }

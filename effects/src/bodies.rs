@@ -4,7 +4,7 @@
 //! the link's origin, h the first (Wensing, Kim, Slotine, IEEE RA-L 3(1) 2018, eq. 8). In units of the nominal link, J_0 = L Lᵀ,
 //! a link that is off by little has L⁻¹ J L⁻ᵀ near one; eigenvalues below a least one are raised to it.
 
-use crate::{Effect, Payload};
+use crate::{Effect, LinkInertiaError, Payload};
 use gapscope_dynamics::{Inertia, Model};
 use glam::{DMat3, DVec3};
 use nalgebra::{Matrix4, SMatrix, SVector};
@@ -24,39 +24,36 @@ pub fn keep_bodies(model: &Model, effects: &mut [Effect]) {
         // A load that is missing leaves a body; one that is there is a body of its own.
         let mut link = nominal;
         // What a load gives up, the link's own error takes: together they stay what was fitted.
-        let mut given_up = [0.0; 10];
+        let mut given_up = Parameters::zeros();
         for effect in effects.iter_mut() {
             if let Effect::Payload(payload) = effect
                 && payload.joint == joint.name
                 && payload.mass < 0.0
             {
-                let whole = payload.link_inertia().parameters();
+                given_up += parameters(&payload.link_inertia());
                 lighten(payload, &link, &unit);
-                let kept = payload.link_inertia();
-                link = link.add(&kept);
-                let kept = kept.parameters();
-                (0..10).for_each(|i| given_up[i] += whole[i] - kept[i]);
+                given_up -= parameters(&payload.link_inertia());
+                link = link.add(&payload.link_inertia());
             }
         }
         for effect in effects.iter_mut() {
             if let Effect::LinkInertiaError(error) = effect
                 && error.joint == joint.name
             {
-                let wished: [f64; 10] = std::array::from_fn(|i| error.coefficients()[i] + given_up[i]);
-                let told = match raised(&link.add(&Inertia::from_parameters(&wished)), &unit) {
-                    Some(body) => {
-                        let (body, link) = (body.parameters(), link.parameters());
-                        std::array::from_fn(|i| body[i] - link[i])
-                    }
-                    None => wished,
-                };
-                given_up = [0.0; 10];
-                error.mass_delta = told[0];
-                error.first_moment_delta = [told[1], told[2], told[3]];
-                error.inertia_delta = [told[4], told[5], told[6], told[7], told[8], told[9]];
+                let wished = Parameters::from(error.coefficients()) + std::mem::take(&mut given_up);
+                let body = raised(&link.add(&Inertia::from_parameters(&wished.into())), &unit);
+                let kept = body.map_or(wished, |body| parameters(&body) - parameters(&link));
+                *error = LinkInertiaError::with_coefficients(&joint.name, &kept.into());
             }
         }
     }
+}
+
+/// Ten inertial parameters: kg, kg m, kg m².
+type Parameters = SVector<f64, 10>;
+
+fn parameters(inertia: &Inertia) -> Parameters {
+    inertia.parameters().into()
 }
 
 /// What keeps a link a body while its ten inertial parameters are fitted: the log-det divergence of its pseudo-inertia from
@@ -168,7 +165,7 @@ fn from_pseudo(j: &Matrix4<f64>) -> Inertia {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{LinkInertiaError, Plant};
+    use crate::Plant;
     use gapscope_dynamics::robots;
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;
@@ -229,12 +226,7 @@ mod tests {
         let link = last.inertia.parameters();
         // The sum is half the link.
         let error: [f64; 10] = std::array::from_fn(|i| -0.5 * link[i] - lacks[i]);
-        let error = LinkInertiaError {
-            joint: last.name.clone(),
-            mass_delta: error[0],
-            first_moment_delta: [error[1], error[2], error[3]],
-            inertia_delta: [error[4], error[5], error[6], error[7], error[8], error[9]],
-        };
+        let error = LinkInertiaError::with_coefficients(&last.name, &error);
         for order in [[0, 1], [1, 0]] {
             let both = [Effect::Payload(load.clone()), Effect::LinkInertiaError(error.clone())];
             let mut effects: Vec<Effect> = order.iter().map(|&i| both[i].clone()).collect();

@@ -1,12 +1,12 @@
 """Opens pages in headless Chromium, uses them as a person would, and says what is wrong.
 
     pip install playwright==1.56.0                 # the driver alone; the browser is the system's own Chromium
-    python tests/report/browser.py report.html...  [--index] [--shots FOLDER] [--within SECONDS] [--picture FILE]
+    python tests/report/browser.py report.html...  [--index] [--shots FOLDER] [--both] [--within SECONDS] [--picture FILE]
 
 Each page is opened from its folder, without a network, at three sizes, light and dark. Checked: no error on the console,
-no request to anywhere, no sideways scrolling, text readable against what is behind it (WCAG AA). At each size once, light
-and dark by turns: the links to the sections of a report, turning the robot, the filter by joint and the zoom, by pointer and
-by key, and what plays. Of a report also that it says the same without JavaScript, and how it prints.
+no request to anywhere, no sideways scrolling, text readable against what is behind it (WCAG AA). At each size, light
+and dark by turns or with --both in either: the links to the sections of a report, turning the robot, the filter by joint and
+the zoom, by pointer and by key, and what plays. Of a report also that it says the same without JavaScript, and how it prints.
 With --index the page is one that `gapscope report` wrote. Exit status 0 if all is well, 1 if not, 77 if there is no browser.
 """
 
@@ -57,6 +57,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("pages", nargs="+", type=pathlib.Path)
     parser.add_argument("--index", action="store_true")
+    parser.add_argument("--both", action="store_true", help="use each page in light and in dark")
     parser.add_argument("--shots", type=pathlib.Path)
     parser.add_argument("--picture", type=pathlib.Path, help="the first screen of the first page, for the documents")
     parser.add_argument("--within", type=float, help="the longest that a page may take to open, s")
@@ -78,8 +79,7 @@ def main():
             for place, size in enumerate(SIZES):
                 for turn, scheme in enumerate(["light", "dark"]):
                     name = f"{file.parent.name or 'page'} {size[0]} {scheme}"
-                    # Keys and pointer do the same in both schemes.
-                    used = (page + place + turn) % 2 == 0
+                    used = args.both or (page + place + turn) % 2 == 0
                     faults += [f"{name}: {fault}" for fault in check(browser, file, size, scheme, used, args)]
             if not args.index:
                 faults += [f"{file}: {fault}" for fault in check_without_script(browser, file)]

@@ -5,7 +5,6 @@ use super::sample::Sample;
 use crate::robust::rms;
 use gapscope_dynamics::{Data, Model};
 use nalgebra::{DMatrix, DVector};
-use std::borrow::Cow;
 
 /// What lies below this share of the effort's variance is no evidence: no robot is known that well.
 const FLOOR: f64 = 3e-4;
@@ -152,8 +151,11 @@ impl<'a> Rows<'a> {
         };
         let mut tables: Vec<(usize, Vec<usize>, DMatrix<f64>)> = (0..n)
             .filter(|&j| active[j])
-            .map(|j| (j, columns(j)))
-            .map(|(j, columns)| (j, columns.clone(), DMatrix::zeros(columns.len(), sample.len())))
+            .map(|j| {
+                let columns = columns(j);
+                let table = DMatrix::zeros(columns.len(), sample.len());
+                (j, columns, table)
+            })
             .collect();
         let mut bodies = DMatrix::zeros(n, 10 * n);
         let mut data = Data::new(model);
@@ -176,11 +178,9 @@ impl<'a> Rows<'a> {
             let target: Vec<f64> = heard.iter().map(|&k| sample.effort[joint][k] / scale[joint]).collect();
             let left = heard.iter().zip(&target).map(|(&k, effort)| effort - torque[joint][k]);
             let left = DVector::from_iterator(heard.len(), left);
-            let all = heard.len() == sample.len();
-            let told = if all { Cow::Borrowed(&table) } else { Cow::Owned(table.select_columns(&heard)) };
-            let (normal, right) = (&*told * told.transpose(), &*told * &left);
+            let told = table.select_columns(&heard);
+            let (normal, right) = (&told * told.transpose(), &told * &left);
             let (square, variance) = (left.norm_squared(), spread(&target));
-            drop(told);
             Row { joint, columns, table, normal, right, square, variance }
         };
         let rows = tables.into_iter().map(row).collect();

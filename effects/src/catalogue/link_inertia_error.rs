@@ -91,7 +91,7 @@ impl Signature for LinkInertiaError {
 impl Listed for LinkInertiaError {
     fn from_coefficients(candidate: &Candidate, model: &Model, coefficients: &[f64]) -> Option<LinkInertiaError> {
         let (&j, parameters) = candidate.joints.first().zip(coefficients.try_into().ok())?;
-        Some(from_coefficients(&model.joints()[j].name, parameters))
+        Some(LinkInertiaError::with_coefficients(&model.joints()[j].name, parameters))
     }
 }
 
@@ -100,6 +100,16 @@ impl LinkInertiaError {
     pub(crate) fn coefficients(&self) -> [f64; 10] {
         let ([x, y, z], [xx, xy, yy, xz, yz, zz]) = (self.first_moment_delta, self.inertia_delta);
         [self.mass_delta, x, y, z, xx, xy, yy, xz, yz, zz]
+    }
+
+    /// The error of a joint's link with these ten parameters.
+    pub(crate) fn with_coefficients(joint: &str, c: &[f64; 10]) -> LinkInertiaError {
+        LinkInertiaError {
+            joint: joint.to_owned(),
+            mass_delta: c[0],
+            first_moment_delta: [c[1], c[2], c[3]],
+            inertia_delta: [c[4], c[5], c[6], c[7], c[8], c[9]],
+        }
     }
 }
 
@@ -135,16 +145,6 @@ fn scales(model: &Model, joint: usize) -> Vec<f64> {
         InertialSource::MassKnown => (ON_A_SCALE, GUESSED),
     };
     [&[of_mass * (MASS * mass)][..], &[of_shape * moment; 3], &[of_shape * inertia; 6]].concat()
-}
-
-/// The error with these ten coefficients of the link's regressor.
-fn from_coefficients(joint: &str, c: &[f64; 10]) -> LinkInertiaError {
-    LinkInertiaError {
-        joint: joint.to_owned(),
-        mass_delta: c[0],
-        first_moment_delta: [c[1], c[2], c[3]],
-        inertia_delta: [c[4], c[5], c[6], c[7], c[8], c[9]],
-    }
 }
 
 #[cfg(test)]

@@ -15,8 +15,8 @@ fn report_and_index_work_in_a_browser() {
     let page = std::fs::read_to_string(dir.path().join("runs/first/report.html")).unwrap();
     let home = dir.path().to_string_lossy().into_owned();
     assert!(!page.contains(&home), "no path of this machine is on the page");
-    look(&[&dir.path().join("runs/first/report.html")], &[]);
-    look(&[&dir.path().join("runs/index.html")], &["--index"]);
+    look(&[&dir.path().join("runs/first/report.html")], &["--both"]);
+    look(&[&dir.path().join("runs/index.html")], &["--index", "--both"]);
 }
 
 #[test]

@@ -65,6 +65,15 @@ pub struct Motion {
     state: Vec<[Vec<f64>; 3]>,
 }
 
+impl Motion {
+    /// The samples from `from` to `to`, the latter included.
+    pub fn part(&self, [from, to]: [usize; 2]) -> Motion {
+        let rows = from * self.per..=to * self.per;
+        let part = |state: &[Vec<f64>; 3]| std::array::from_fn(|i| state[i][rows.clone()].to_vec());
+        Motion { per: self.per, state: self.state.iter().map(part).collect() }
+    }
+}
+
 /// Rows in an interval between samples of a log.
 pub fn rows_per_sample(episode: &Episode) -> usize {
     ((episode.dt() / FINE - 1e-6).ceil().max(1.0)) as usize

@@ -12,12 +12,12 @@ use crate::prepare::Joint;
 use crate::simulate::errors;
 use crate::weigh::{independent, least, tracking, weigh};
 
-/// Steps of a fit that only decides whether a kind is worth more.
-pub(crate) const TRIAL: usize = 8;
-/// Steps of a fit that only decides whether a kind is tried.
-const GLANCE: usize = 4;
-/// Steps of a fit that is kept.
-pub(crate) const FULL: usize = 25;
+/// Rounds of a fit that only decides whether a kind is worth more.
+pub(crate) const TRIAL: usize = 3;
+/// Rounds of a fit that only decides whether a kind is tried.
+const GLANCE: usize = 2;
+/// Rounds of a fit that is kept.
+pub(crate) const FULL: usize = 20;
 /// Nats from which on a kind is taken: no law of a servo is exact, and what is left of it speaks for some kind or other.
 pub(crate) const TAKEN: f64 = 4.0;
 
@@ -102,14 +102,14 @@ impl Choice<'_> {
     }
 
     /// The best fit of some kinds from a law, with those of `new` started afresh.
-    pub(crate) fn fit(&self, law: &Law, kinds: &[Kind], new: Option<Kind>, steps: usize) -> Fit {
+    pub(crate) fn fit(&self, law: &Law, kinds: &[Kind], new: Option<Kind>, rounds: usize) -> Fit {
         let free = self.free(kinds);
         let from = |(mut law, start, link_side): (Law, f64, bool)| {
             if let Some(kind) = new {
                 self.begin(kind, &mut law, start);
                 law.link_side |= link_side;
             }
-            fit(&law, &free, &self.joint.runs, &self.joint.ranges, steps)
+            fit(&law, &free, &self.joint.runs, &self.joint.ranges, rounds)
         };
         let starts: &[f64] = new.map_or(&[1.0], Kind::starts);
         let mut places: Vec<(Law, f64, bool)> = Vec::new();
@@ -182,7 +182,7 @@ impl Choice<'_> {
         if energy <= 0.0 || (!signed && along >= 0.0) { 0.0 } else { along * along / energy }
     }
 
-    /// Squared error that a kind takes away in a few steps from next to no friction.
+    /// Squared error that a kind takes away in a few rounds from next to no friction.
     fn glance(&self, best: &Fit, kinds: &[Kind], kind: Kind) -> f64 {
         let with: Vec<Kind> = kinds.iter().copied().chain([kind]).collect();
         (best.cost - self.fit(&self.bare, &with, Some(kind), GLANCE).cost).max(0.0)

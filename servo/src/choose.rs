@@ -1,13 +1,14 @@
 //! Which effects a joint has: kinds are added, exchanged and dropped while the score of the fit rises.
 
 use crate::choice::{Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
+use crate::excerpt;
 use crate::fit::{Fit, fit};
 use crate::kinds::Kind;
 use crate::law::{Law, Param};
 use crate::needless::{drop_needless, exchange, ties};
 use crate::prepare::Joint;
 use crate::run::Signal;
-use crate::weigh::independent;
+use crate::weigh::{independent, weigh};
 
 /// Kinds that one joint may have at most, before what is needless is dropped.
 const MOST: usize = 9;
@@ -99,8 +100,22 @@ impl From {
     }
 }
 
-/// Finds what one joint has. Leaves the weights of its runs as the last fit had them.
+/// Finds what one joint has, by an excerpt of long logs; its parameters are those of all. Leaves the weights of its runs as the
+/// last fit had them.
 pub fn choose(joint: &mut Joint, from: &From) -> Chosen {
+    let Some(mut part) = excerpt::of_joint(joint) else { return choose_by_all(joint, from) };
+    let mut found = choose_by_all(&mut part, from);
+    weigh(joint, &found.fit.law);
+    let refit = |own: &Fit, rounds: usize| fit(&own.law, &own.free, &joint.runs, &joint.ranges, rounds);
+    found.fit = refit(&found.fit, FULL);
+    if let Some(poorer) = &mut found.poorer {
+        poorer.fit = refit(&poorer.fit, TRIAL);
+    }
+    found.samples = independent(joint, &found.fit.errors);
+    found
+}
+
+fn choose_by_all(joint: &mut Joint, from: &From) -> Chosen {
     let given = joint.given;
     let (mut choice, mut kinds, possible) = begin(joint);
     let mut why = Vec::new();

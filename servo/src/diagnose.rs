@@ -7,6 +7,7 @@ use crate::choose::{Chosen, From, choose};
 use crate::claims::{confidence, drive, effects, reasons, whole_effect};
 use crate::clock::nominal_rate;
 use crate::evidence::Evidence;
+use crate::excerpt;
 use crate::experiment::{self, next_experiment};
 use crate::fit::fit;
 use crate::gap::{self, Errors};
@@ -21,7 +22,7 @@ use crate::schema::*;
 use crate::simulate::trace;
 use crate::together::{drop_what_the_arm_does_not_miss, is_missed};
 use crate::units;
-use crate::whole::{Found, Whole, changed, look, surround};
+use crate::whole::{Found, Whole, changed, look, refine, surround};
 use gapscope_datasets::{Episode, Trajectory};
 use gapscope_dynamics::Model;
 use gapscope_effects::Effect;
@@ -33,8 +34,8 @@ const PARTLY: f64 = 0.6;
 /// How often each joint is looked at anew, in surroundings by what was found of the others: the first time by laws that were found
 /// beside the measured motion.
 const PASSES: usize = 2;
-/// Steps of a fit with a fold left out: it begins where the whole fit ended.
-const FOLD: usize = 8;
+/// Rounds of a fit with a fold left out: it begins where the whole fit ended.
+const FOLD: usize = 3;
 
 /// Simulated positions, rad or m: `[log][joint][sample]`.
 pub type Paths = Vec<Vec<Vec<f64>>>;
@@ -72,9 +73,8 @@ pub fn diagnose(
     progress("what the whole arm has", 0.5);
     // The search goes by what was measured: an arm without the effect moves otherwise than the one that has it.
     let moved = motions(model, &all, &vec![None; all.len()], episodes);
-    let (wholes, rivals) = find_wholes(model, &moved, &mut all, &mut chosen);
-    let bodies: Vec<Effect> = wholes.iter().filter_map(|found| found.whole.effect(model, &found.values)).collect();
-    let real = changed(model, &bodies).unwrap_or_else(|| model.clone());
+    let (mut wholes, rivals) = find_wholes(model, &moved, &mut all, &mut chosen);
+    let mut real = with(model, &wholes).unwrap_or_else(|| model.clone());
     for pass in 0..PASSES {
         // What jolts between samples did is no spring: the free run of the arm, which has those jolts, says so first. Of a link that
         // turns apart from its motor the encoder shows one side, and what the log corrects of it is not told from what its motor
@@ -96,8 +96,14 @@ pub fn diagnose(
         let accounts: Vec<From> = chosen.iter().zip(rigid).map(begin).collect();
         let laws: Vec<Option<Law>> = accounts.iter().map(From::law).collect();
         let moved = motions(&real, &all, &laws, episodes);
-        surround(&mut all, &real, &moved);
-        chosen = choose_all(&mut all, &accounts);
+        if refine_all(model, &moved, &mut all, &chosen, &mut wholes) {
+            real = with(model, &wholes).unwrap_or(real);
+            surround(&mut all, &real, &moved);
+            chosen = choose_all(&mut all, &nothing);
+        } else {
+            surround(&mut all, &real, &moved);
+            chosen = choose_all(&mut all, &accounts);
+        }
     }
     drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
     findings.extend(
@@ -108,6 +114,7 @@ pub fn diagnose(
     findings.extend(nominal_rate(episodes));
     progress("how far the arm's free run is from the logs", 0.8);
     let weights = weights(&all, episodes);
+    let bodies: Vec<Effect> = wholes.iter().filter_map(|found| found.whole.effect(model, &found.values)).collect();
     let law = |j: usize| chosen[j].as_ref().map_or(all[j].start_still(), |c| c.fit.law);
     let found: Vec<Law> = (0..all.len()).map(law).collect();
     let corrected = ServoModel::new(model, &all, &found, &weights, &bodies);
@@ -226,13 +233,12 @@ fn find_wholes(
     let (mut real, mut found) = (model.clone(), Vec::<Found>::new());
     loop {
         let taken: Vec<Whole> = found.iter().map(|found| found.whole).collect();
-        let looked = look(&real, moved, joints, chosen, &taken);
-        let Some(next) = looked.found else { return (found, looked.ties) };
-        let Some(there) =
-            next.whole.effect(&real, &next.values).and_then(|effect| changed(&real, std::slice::from_ref(&effect)))
-        else {
-            return (found, looked.ties);
+        let looked = match excerpt::of_arm(joints, moved) {
+            Some((mut joints, moved)) => look(&real, &moved, &mut joints, chosen, &taken),
+            None => look(&real, moved, joints, chosen, &taken),
         };
+        let Some(next) = looked.found else { return (found, looked.ties) };
+        let Some(there) = with(&real, std::slice::from_ref(&next)) else { return (found, looked.ties) };
         let before = laws_of(chosen);
         if !is_missed(joints, (&there, &next.laws), (&real, &before)) {
             return (found, looked.ties);
@@ -242,6 +248,37 @@ fn find_wholes(
         *chosen = choose_all(joints, &vec![From::Nothing; joints.len()]);
         found.push(next);
     }
+}
+
+/// Effects of the whole arm anew, each beside the others, in a motion that has the joints' jolts: those measured are smoothed.
+/// Whether any was.
+fn refine_all(
+    model: &Model,
+    moved: &[Motion],
+    joints: &mut [Joint],
+    chosen: &[Option<Chosen>],
+    wholes: &mut [Found],
+) -> bool {
+    let mut any = false;
+    for at in 0..wholes.len() {
+        let others: Vec<Found> =
+            wholes.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, own)| own.clone()).collect();
+        let Some(base) = with(model, &others) else { continue };
+        let refined = match excerpt::of_arm(joints, moved) {
+            Some((mut joints, moved)) => refine(&base, &moved, &mut joints, chosen, &wholes[at]),
+            None => refine(&base, moved, joints, chosen, &wholes[at]),
+        };
+        if let Some(refined) = refined {
+            (wholes[at], any) = (refined, true);
+        }
+    }
+    any
+}
+
+/// The model with effects of the whole arm; `None` where they are no body's.
+fn with(model: &Model, wholes: &[Found]) -> Option<Model> {
+    let bodies: Option<Vec<Effect>> = wholes.iter().map(|found| found.whole.effect(model, &found.values)).collect();
+    changed(model, &bodies?)
 }
 
 /// The errors of all logs.

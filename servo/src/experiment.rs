@@ -118,14 +118,17 @@ pub fn next_experiment(model: &Model, corrected: &ServoModel, found: &[Found]) -
     let name = format!("{} at {}", name(chosen, worst.param)?, joint.name);
     let percent =
         |part: f64| if part > 1.0 { "more than 100 %".to_owned() } else { format!("{:.0} %", (100.0 * part).max(1.0)) };
+    let would = if there > 1.0 {
+        format!("known {:.1} times as well", worst.part / there)
+    } else {
+        format!("known to about {}", percent(there))
+    };
     let next = NextExperiment {
         why: format!("{name} is known to {} of itself", percent(worst.part)),
         separates: vec![],
         motion: format!(
-            "send {FILE} as set points (look for collisions first): {} of all joints, {} s. {name} would then be known to about {}",
-            LIBRARY[i].2,
-            LENGTH.0,
-            percent(there)
+            "send {FILE} as set points (look for collisions first): {} of all joints, {} s. {name} would then be {would}",
+            LIBRARY[i].2, LENGTH.0,
         ),
         trajectory: Some(FILE.to_owned()),
         separation: None,

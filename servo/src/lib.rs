@@ -13,6 +13,7 @@ mod clock;
 mod diagnose;
 mod evaluate;
 mod evidence;
+mod excerpt;
 mod experiment;
 mod fit;
 mod follow;

@@ -5,7 +5,7 @@ use crate::clock::repeats;
 use crate::fit::Ranges;
 use crate::given::Given;
 use crate::law::{Law, PARAMS, Param};
-use crate::run::{Held, Run, Signal};
+use crate::run::{Held, Run, Signal, Steps};
 use gapscope_datasets::Episode;
 use gapscope_dynamics::Model;
 use rayon::prelude::*;
@@ -187,6 +187,7 @@ fn joint(
             stale: stale[log].clone(),
             time,
             step: 5e-3,
+            steps: Steps::default(),
             log,
         });
     }

@@ -44,7 +44,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::{Around, Held, Run, Signal, Surroundings};
+    use crate::run::{Around, Held, Run, Signal, Steps, Surroundings};
 
     /// A joint that rests at zero by its law, and whose log shows these positions.
     fn joint(position: Vec<f64>) -> Joint {
@@ -68,6 +68,7 @@ mod tests {
             stale: vec![false; count],
             time,
             step: 5e-3,
+            steps: Steps::default(),
             log: 0,
         };
         Joint { runs: vec![run], ..Joint::blank(Signal::Command) }

@@ -1,6 +1,7 @@
 //! One joint's part of one log, ready to be simulated alone: what it was told, and what the rest of the arm does to it.
 
 use gapscope_datasets::Episode;
+use std::sync::OnceLock;
 
 /// What stands in the place of a joint's torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -204,11 +205,90 @@ pub struct Run {
     pub restarts: Vec<usize>,
     /// Longest step of the integrator, s.
     pub step: f64,
+    /// Steps of the integrator, once they were asked for.
+    pub steps: Steps,
     /// Index of the log.
     pub log: usize,
 }
 
+/// A step of the integrator: what of it no law changes.
+#[derive(Debug, Clone, Copy)]
+pub struct Step {
+    /// Sample that it lies behind.
+    pub sample: usize,
+    /// Where it begins and ends, in parts of the way to the next sample.
+    pub span: [f64; 2],
+    /// When it begins, and how long it is, s.
+    pub time: f64,
+    /// See `time`.
+    pub length: f64,
+    /// What the rest of the arm does in its middle.
+    pub around: Around,
+    /// Whether the next sample lies at its end.
+    pub is_last: bool,
+}
+
+/// The steps of a run, cut when they are first asked for.
+#[derive(Debug, Clone, Default)]
+pub struct Steps(OnceLock<Vec<Step>>);
+
 impl Run {
+    /// The steps of the integrator, in order.
+    pub fn steps(&self) -> &[Step] {
+        self.steps.0.get_or_init(|| {
+            let mut steps = Vec::new();
+            for (k, pair) in self.time.windows(2).enumerate() {
+                let dt = pair[1] - pair[0];
+                let parts = (dt / self.step - 1e-6).ceil().max(1.0);
+                let (length, of_sample) = (dt / parts, 1.0 / parts);
+                steps.extend((0..parts as usize).map(|part| {
+                    let span = [part, part + 1].map(|part| part as f64 * of_sample);
+                    Step {
+                        sample: k,
+                        span,
+                        time: pair[0] + part as f64 * length,
+                        length,
+                        around: self.around.over(k, span),
+                        is_last: part + 1 == parts as usize,
+                    }
+                }));
+            }
+            steps
+        })
+    }
+
+    /// Goes by steps of at most `longest` s from now on.
+    pub fn step_by(&mut self, longest: f64) {
+        if self.step != longest {
+            self.step = longest;
+            self.steps = Steps::default();
+        }
+    }
+
+    /// Puts it into other surroundings.
+    pub fn surround(&mut self, around: Surroundings) {
+        self.around = around;
+        self.steps = Steps::default();
+    }
+
+    /// The samples from `from` to `to`, the latter included, as a run that begins in the state that the log shows.
+    pub fn part(&self, [from, to]: [usize; 2]) -> Run {
+        let per = self.around.per;
+        let restarts = self.restarts.iter().filter(|k| (from..to).contains(*k)).map(|k| k - from);
+        let begins_anew = from > 0 && !self.restarts.contains(&from);
+        Run {
+            time: self.time[from..=to].to_vec(),
+            position: self.position[from..=to].to_vec(),
+            on: self.on[from..=to].to_vec(),
+            around: Surroundings::new(per, self.around.rows[from * per..=to * per].to_vec()),
+            weight: self.weight[from..=to].to_vec(),
+            stale: self.stale[from..=to].to_vec(),
+            restarts: begins_anew.then_some(0).into_iter().chain(restarts).collect(),
+            steps: Steps::default(),
+            ..self.clone()
+        }
+    }
+
     /// Measured position, rad, and speed by the parabola through the samples around, rad/s.
     pub fn state(&self, k: usize) -> (f64, f64) {
         crate::around::state(&self.time, &self.position, k)

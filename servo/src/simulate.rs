@@ -2,7 +2,7 @@
 
 use crate::around::Trace;
 use crate::law::{Law, Order, Param};
-use crate::run::{Around, Held, Run};
+use crate::run::{Around, Held, Run, Step};
 use crate::wind_up::{Shaft, Wound};
 
 /// Step of the integrator, s: this part of the servo's own time constant, within these bounds.
@@ -90,7 +90,6 @@ fn weight(around: &Around, angle: f64) -> f64 {
 #[inline]
 fn follow(law: &Law, run: &Run, out: &mut Vec<f64>, mut see: impl FnMut([f64; 2], State, State)) {
     out.clear();
-    let count = run.time.len();
     if let Some(shaft) = law.shaft(run.mass) {
         return follow_wound(law, &shaft, run, out, see);
     }
@@ -98,28 +97,24 @@ fn follow(law: &Law, run: &Run, out: &mut Vec<f64>, mut see: impl FnMut([f64; 2]
     let (mut hint, mut restart) = (0, 0);
     let sigma = law[Param::Scale];
     out.push(q);
-    for k in 0..count - 1 {
-        if run.restarts.get(restart) == Some(&k) {
+    for step in run.steps() {
+        let Step { sample: k, span, time, length: h, around, .. } = step;
+        if span[0] == 0.0 && run.restarts.get(restart) == Some(k) {
             restart += 1;
-            (q, v) = run.state(k);
+            (q, v) = run.state(*k);
         }
-        let dt = run.time[k + 1] - run.time[k];
-        let parts = (dt / run.step - 1e-6).ceil().max(1.0);
-        let (h, of_sample) = (dt / parts, 1.0 / parts);
-        for part in 0..parts as usize {
-            let span = [part, part + 1].map(|part| part as f64 * of_sample);
-            let around = run.around.over(k, span);
-            let inertia = sigma * around.inertia / h;
-            let weight = weight(&around, q + 0.5 * h * v - law[Param::Offset]);
-            let order = order(law, run, k, run.time[k] + part as f64 * h, h, &mut hint);
-            let row = law.row(h, q, v, order, inertia);
-            let push = row.push + inertia * v - sigma * weight;
-            let end = law.settle(&row, v, row.factor + inertia, push);
-            let before = (q, v);
-            (q, v) = (Law::move_on(h, row.end, q, v, end), end);
-            see(span.map(|part| k as f64 + part), before, (q, v));
+        let inertia = sigma * around.inertia / h;
+        let weight = weight(around, q + 0.5 * h * v - law[Param::Offset]);
+        let order = order(law, run, *k, *time, *h, &mut hint);
+        let row = law.row(*h, q, v, order, inertia);
+        let push = row.push + inertia * v - sigma * weight;
+        let end = law.settle(&row, v, row.factor + inertia, push);
+        let before = (q, v);
+        (q, v) = (Law::move_on(*h, row.end, q, v, end), end);
+        see(span.map(|part| *k as f64 + part), before, (q, v));
+        if step.is_last {
+            out.push(q);
         }
-        out.push(q);
     }
 }
 
@@ -130,32 +125,28 @@ fn follow_wound(law: &Law, shaft: &Shaft, run: &Run, out: &mut Vec<f64>, mut see
     let mut state = shaft.at_rest(run.position[0], sigma * run.around.at(0).gravity, law.link_side);
     let (mut hint, mut restart) = (0, 0);
     out.push(shown(&state));
-    for k in 0..run.time.len() - 1 {
-        if run.restarts.get(restart) == Some(&k) {
+    for step in run.steps() {
+        let Step { sample: k, span, time, length: h, around, .. } = step;
+        if span[0] == 0.0 && run.restarts.get(restart) == Some(k) {
             restart += 1;
-            let (q, v) = run.state(k);
-            state = shaft.at_rest(q, sigma * run.around.at(k).gravity, law.link_side);
+            let (q, v) = run.state(*k);
+            state = shaft.at_rest(q, sigma * run.around.at(*k).gravity, law.link_side);
             (state.motor[1], state.link[1]) = (v, v);
         }
-        let dt = run.time[k + 1] - run.time[k];
-        let parts = (dt / run.step - 1e-6).ceil().max(1.0);
-        let (h, of_sample) = (dt / parts, 1.0 / parts);
-        for part in 0..parts as usize {
-            let span = [part, part + 1].map(|part| part as f64 * of_sample);
-            let around = run.around.over(k, span);
-            let weight = weight(&around, state.link[0] + 0.5 * h * state.link[1] - law[Param::Offset]);
-            let inertia = sigma * around.inertia / h;
-            let order = order(law, run, k, run.time[k] + part as f64 * h, h, &mut hint);
-            // The servo closes its loop over what its encoder shows; the rotor has its own speed.
-            let row = law.row(h, shown(&state), state.motor[1], order, 0.0);
-            let push = inertia * state.link[1] - sigma * weight;
-            let before = (state.link[0], state.link[1]);
-            let speed = state.motor[1];
-            shaft.step(h, &mut state, &row, inertia, push, |factor, push| law.settle(&row, speed, factor, push));
-            let after = (state.link[0], state.link[1]);
-            see(span.map(|part| k as f64 + part), before, after);
+        let weight = weight(around, state.link[0] + 0.5 * h * state.link[1] - law[Param::Offset]);
+        let inertia = sigma * around.inertia / h;
+        let order = order(law, run, *k, *time, *h, &mut hint);
+        // The servo closes its loop over what its encoder shows; the rotor has its own speed.
+        let row = law.row(*h, shown(&state), state.motor[1], order, 0.0);
+        let push = inertia * state.link[1] - sigma * weight;
+        let before = (state.link[0], state.link[1]);
+        let speed = state.motor[1];
+        shaft.step(*h, &mut state, &row, inertia, push, |factor, push| law.settle(&row, speed, factor, push));
+        let after = (state.link[0], state.link[1]);
+        see(span.map(|part| *k as f64 + part), before, after);
+        if step.is_last {
+            out.push(shown(&state));
         }
-        out.push(shown(&state));
     }
 }
 

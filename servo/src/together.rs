@@ -17,9 +17,9 @@ pub fn drop_what_the_arm_does_not_miss(model: &Model, joints: &[Joint], chosen: 
     for j in 0..joints.len() {
         let Some(poorer) = chosen[j].as_mut().and_then(|own| own.poorer.take()) else { continue };
         let mut laws = laws(joints, chosen.iter().map(|c| c.as_ref().map(|c| c.fit.law)));
-        let rich = squares(model, &laws, joints, j);
+        let rich = squares(model, &laws, joints)[j];
         laws[j] = Some(poorer.fit.law);
-        let poor = squares(model, &laws, joints, j);
+        let poor = squares(model, &laws, joints)[j];
         let missed = poor - rich > least(rich, tracking(&joints[j]));
         let Some(own) = chosen[j].as_mut() else { continue };
         for said in own.why.iter_mut().filter(|said| said.proposed == poorer.kind && said.last) {
@@ -35,10 +35,7 @@ pub fn drop_what_the_arm_does_not_miss(model: &Model, joints: &[Joint], chosen: 
 
 /// Whether the free run of the whole arm misses an effect of it: `with` and `without` are its bodies and its joints' laws.
 pub fn is_missed(joints: &[Joint], with: (&Model, &[Option<Law>]), without: (&Model, &[Option<Law>])) -> bool {
-    let all = |(model, own): (&Model, &[Option<Law>])| -> Vec<f64> {
-        let laws = laws(joints, own.iter().copied());
-        (0..joints.len()).map(|j| squares(model, &laws, joints, j)).collect()
-    };
+    let all = |(model, own): (&Model, &[Option<Law>])| squares(model, &laws(joints, own.iter().copied()), joints);
     let (rich, poor) = (all(with), all(without));
     let perfect: Vec<f64> = joints.iter().map(|joint| tracking(joint).max(1e-300)).collect();
     // Each joint by its own tracking error, so that a wrist counts as much as a shoulder.
@@ -51,15 +48,18 @@ fn laws(joints: &[Joint], own: impl Iterator<Item = Option<Law>>) -> Vec<Option<
     joints.iter().zip(own).map(|(joint, own)| Some(own.unwrap_or(joint.start_still()))).collect()
 }
 
-/// Squared error of a joint in the free run of the arm, by the weights of its samples; infinite where the run ends early.
-fn squares(model: &Model, laws: &[Option<Law>], joints: &[Joint], joint: usize) -> f64 {
-    let runs = &joints[joint].runs;
-    let one = |log: usize| -> f64 {
-        let path = &simulate_arm(model, laws, joints, log)[joint];
-        let run = &runs[log];
-        let errors = path.iter().zip(&run.position).zip(&run.weight);
-        errors.map(|((simulated, measured), weight)| (weight * (simulated - measured)).powi(2)).sum()
+/// Squared error of each joint in the free run of the arm, by the weights of its samples; infinite where the run ends early.
+fn squares(model: &Model, laws: &[Option<Law>], joints: &[Joint]) -> Vec<f64> {
+    let logs = joints.first().map_or(0, |joint| joint.runs.len());
+    let paths: Vec<Vec<Vec<f64>>> =
+        (0..logs).into_par_iter().map(|log| simulate_arm(model, laws, joints, log)).collect();
+    let of = |(j, joint): (usize, &Joint)| {
+        let rows = joint.runs.iter().zip(&paths).flat_map(|(run, path)| {
+            let errors = path[j].iter().zip(&run.position).zip(&run.weight);
+            errors.map(|((simulated, measured), weight)| (weight * (simulated - measured)).powi(2))
+        });
+        let sum: f64 = rows.sum();
+        if sum.is_finite() { sum } else { f64::INFINITY }
     };
-    let sum: f64 = (0..runs.len()).into_par_iter().map(one).sum();
-    if sum.is_finite() { sum } else { f64::INFINITY }
+    joints.iter().enumerate().map(of).collect()
 }

@@ -75,7 +75,7 @@ pub fn weigh(joint: &mut Joint, law: &Law) {
         .min(if law[Param::DeadBand] > 0.0 { 0.5 * law.coasting(inertia) } else { f64::INFINITY });
     let length = (STEP_PART * shortest).clamp(least, greatest);
     for run in &mut joint.runs {
-        run.step = length;
+        run.step_by(length);
         simulate(law, run, &mut path);
         let mut sums = [(0.0, 0.0); 2];
         for k in (0..path.len()).filter(|&k| !run.stale[k]) {

@@ -21,9 +21,9 @@ use rayon::prelude::*;
 
 /// Nats that the logs must give for such an effect beyond its numbers, as for all but calibration.
 const COST: f64 = 3.0;
-/// Steps on θ, and steps of the joints' own parameters for each of them.
-const STEPS: usize = 4;
-const LOCAL: usize = 4;
+/// Steps on θ, and rounds of the joints' own parameters for each of them.
+const STEPS: usize = 8;
+const LOCAL: usize = 2;
 /// A rival ties if the error with it is at most this much more.
 const TIE: f64 = 0.02;
 /// Most that a base is tilted, rad; heaviest body, as a part of the arm's mass; and furthest that it lies from the last joint
@@ -147,7 +147,7 @@ pub fn surround(joints: &mut [Joint], model: &Model, motions: &[Motion]) {
 /// Puts joints into other surroundings.
 fn put(joints: &mut [Joint], around: &Around) {
     for (j, joint) in joints.iter_mut().enumerate() {
-        joint.runs.iter_mut().for_each(|run| run.around = around[run.log][j].clone());
+        joint.runs.iter_mut().for_each(|run| run.surround(around[run.log][j].clone()));
     }
 }
 
@@ -165,8 +165,8 @@ struct Search<'a> {
     motions: &'a [Motion],
     plain: &'a Around,
     /// Surroundings with each number moved by its probe.
-    probed: &'a [Around],
-    probes: &'a [f64],
+    probed: Vec<Around>,
+    probes: Vec<f64>,
 }
 
 /// What a search comes to.
@@ -174,6 +174,8 @@ struct Settled {
     values: Vec<f64>,
     fits: Vec<Option<Fit>>,
     normal: DMatrix<f64>,
+    /// Where the next step leads from here.
+    step: DVector<f64>,
 }
 
 impl Settled {
@@ -182,14 +184,57 @@ impl Settled {
         let values = DVector::from_column_slice(&self.values);
         0.5 * values.dot(&(&self.normal * &values))
     }
+
+    fn covariance(&self) -> DMatrix<f64> {
+        let numbers = self.values.len();
+        self.normal.clone().try_inverse().unwrap_or_else(|| DMatrix::from_diagonal_element(numbers, numbers, 1e6))
+    }
+
+    fn laws(&self) -> Vec<Option<Law>> {
+        self.fits.iter().map(|fit| fit.as_ref().map(|fit| fit.law)).collect()
+    }
 }
 
-impl Search<'_> {
-    /// N and g at fits of the joints as they are surrounded now, by `base`.
-    fn equations(&self, joints: &mut [Joint], fits: &[Option<Fit>], base: &Around) -> (DMatrix<f64>, DVector<f64>) {
+impl<'a> Search<'a> {
+    /// `None` where a probe is no body.
+    fn new(whole: Whole, model: &'a Model, motions: &'a [Motion], plain: &'a Around) -> Option<Self> {
+        let probes = whole.probes(model);
+        let with = |values: &[f64]| Some(around(&changed(model, &[whole.effect(model, values)?])?, motions));
+        let probed: Option<Vec<Around>> = (0..whole.numbers())
+            .map(|i| {
+                // A first moment needs a mass to sit on; what that mass does itself is taken off again.
+                let mut alone = vec![0.0; probes.len()];
+                if whole == Whole::Payload && i > 0 {
+                    alone[0] = probes[0];
+                }
+                let mut values = alone.clone();
+                values[i] = probes[i];
+                let there = with(&values)?;
+                if alone[0] == 0.0 { Some(there) } else { Some(shifted(plain, &with(&alone)?, &there)) }
+            })
+            .collect();
+        Some(Search { whole, model, motions, plain, probed: probed?, probes })
+    }
+
+    /// The surroundings of the arm that has it.
+    fn around(&self, values: &[f64]) -> Option<Around> {
+        if values.iter().all(|value| *value == 0.0) {
+            return Some(self.plain.clone());
+        }
+        Some(around(&changed(self.model, &[self.whole.effect(self.model, values)?])?, self.motions))
+    }
+
+    /// N and g at fits of the joints as they are surrounded now, by `base`; each joint is worth so many `samples`.
+    fn equations(
+        &self,
+        joints: &mut [Joint],
+        fits: &[Option<Fit>],
+        base: &Around,
+        samples: &[f64],
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let p = self.probes.len();
         let mut moved: Vec<Vec<Vec<f64>>> = Vec::with_capacity(p);
-        for (probe, probed) in self.probes.iter().zip(self.probed) {
+        for (probe, probed) in self.probes.iter().zip(&self.probed) {
             // The change by the probe about the nominal arm, laid on the surroundings of now.
             let there = shifted(base, self.plain, probed);
             put(joints, &there);
@@ -209,7 +254,7 @@ impl Search<'_> {
         let (mut normal, mut gradient) = (DMatrix::zeros(p, p), DVector::zeros(p));
         for (j, fit) in fits.iter().enumerate() {
             let Some(fit) = fit else { continue };
-            let weight = independent(&joints[j], &fit.errors) / fit.cost.max(1e-300);
+            let weight = samples[j] / fit.cost.max(1e-300);
             let project = Projector::new(&fit.sensitivity);
             let columns: Vec<Vec<f64>> = moved.iter().map(|columns| project.clear(columns[j].clone())).collect();
             let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -235,47 +280,51 @@ impl Search<'_> {
 
     /// Nats that one linear step promises.
     fn promise(&self, joints: &mut [Joint], fits: &[Option<Fit>]) -> f64 {
-        let (normal, gradient) = self.equations(joints, fits, self.plain);
+        let (normal, gradient) = self.equations(joints, fits, self.plain, &worth(joints, fits));
         self.step(&normal, &gradient).map_or(0.0, |step| -0.5 * step.dot(&gradient))
     }
 
-    fn settle(&self, joints: &mut [Joint], accounts: &[Option<Account>]) -> Option<Settled> {
+    /// The numbers at which the joints' accounts miss least, from some on.
+    fn settle(&self, joints: &mut [Joint], accounts: &[Option<Account>], from: &[f64]) -> Option<Settled> {
         let mut accounts = accounts.to_vec();
-        let mut base = self.plain.clone();
+        let base = self.around(from)?;
         put(joints, &base);
-        let mut fits = fit_all(joints, &accounts, LOCAL);
-        let mut values = vec![0.0; self.probes.len()];
-        let mut best: Option<(f64, Settled)> = None;
+        let fits = fit_all(joints, &accounts, LOCAL);
+        let mut samples = worth(joints, &fits);
+        let (normal, gradient) = self.equations(joints, &fits, &base, &samples);
+        let step = self.step(&normal, &gradient)?;
+        let mut best = Settled { values: from.to_vec(), fits, normal, step };
+        let (mut moved, mut part) = (false, 1.0);
         for _ in 0..STEPS {
-            let (normal, gradient) = self.equations(joints, &fits, &base);
-            if let Some((_, settled)) = &mut best {
-                settled.normal = normal.clone();
-            }
-            let step = self.step(&normal, &gradient)?;
-            values = self.whole.clamped(self.model, &(DVector::from_column_slice(&values) + step));
-            let model = changed(self.model, &[self.whole.effect(self.model, &values)?])?;
-            base = around(&model, self.motions);
+            let values = DVector::from_column_slice(&best.values) + part * &best.step;
+            let values = self.whole.clamped(self.model, &values);
+            let base = self.around(&values)?;
             put(joints, &base);
-            for (account, fit) in accounts.iter_mut().zip(&fits) {
+            for (account, fit) in accounts.iter_mut().zip(&best.fits) {
                 if let (Some(account), Some(fit)) = (account, fit) {
                     account.law = fit.law;
                 }
             }
-            fits = fit_all(joints, &accounts, LOCAL);
-            let score = misfit(joints, &fits);
-            match &best {
-                Some((least, _)) if score > least - 0.5 => break,
-                _ => best = Some((score, Settled { values: values.clone(), fits: fits.clone(), normal })),
+            let fits = fit_all(joints, &accounts, LOCAL);
+            // What leads up goes half as far; the first step is taken as it is, as the effect stands in the place of others.
+            if moved && misfit(&fits, &samples) > misfit(&best.fits, &samples) - 0.5 {
+                part *= 0.5;
+                continue;
             }
+            samples = worth(joints, &fits);
+            let (normal, gradient) = self.equations(joints, &fits, &base, &samples);
+            let step = self.step(&normal, &gradient)?;
+            best = Settled { values, fits, normal, step };
+            (moved, part) = (true, 1.0);
         }
-        best.map(|(_, settled)| settled)
+        moved.then_some(best)
     }
 }
 
-/// A fit of each joint's account, by so many steps at most.
-fn fit_all(joints: &[Joint], accounts: &[Option<Account>], steps: usize) -> Vec<Option<Fit>> {
+/// A fit of each joint's account, by so many rounds at most.
+fn fit_all(joints: &[Joint], accounts: &[Option<Account>], rounds: usize) -> Vec<Option<Fit>> {
     let one = |(joint, account): (&Joint, &Option<Account>)| {
-        account.as_ref().map(|a| fit(&a.law, &a.free, &joint.runs, &joint.ranges, steps))
+        account.as_ref().map(|a| fit(&a.law, &a.free, &joint.runs, &joint.ranges, rounds))
     };
     joints.par_iter().zip(accounts).map(one).collect()
 }
@@ -296,12 +345,18 @@ fn shifted(base: &Around, plain: &Around, probed: &Around) -> Around {
     base.iter().zip(plain).zip(probed).map(log).collect()
 }
 
+/// Independent samples of each joint.
+fn worth(joints: &[Joint], fits: &[Option<Fit>]) -> Vec<f64> {
+    let of = |(joint, fit): (&Joint, &Option<Fit>)| fit.as_ref().map_or(0.0, |fit| independent(joint, &fit.errors));
+    joints.iter().zip(fits).map(of).collect()
+}
+
 /// Σ ½ N ln(squared error) over joints.
-fn misfit(joints: &[Joint], fits: &[Option<Fit>]) -> f64 {
-    let one = |(joint, fit): (&Joint, &Option<Fit>)| {
-        fit.as_ref().map_or(0.0, |fit| 0.5 * independent(joint, &fit.errors) * fit.cost.max(1e-300).ln())
+fn misfit(fits: &[Option<Fit>], samples: &[f64]) -> f64 {
+    let of = |(fit, samples): (&Option<Fit>, &f64)| {
+        fit.as_ref().map_or(0.0, |fit| 0.5 * samples * fit.cost.max(1e-300).ln())
     };
-    joints.iter().zip(fits).map(one).sum()
+    fits.iter().zip(samples).map(of).sum()
 }
 
 /// What looking for effects of the whole arm gives.
@@ -322,8 +377,7 @@ pub fn look(
     without: &[Whole],
 ) -> Outcome {
     let plain = around(model, motions);
-    let beside: Vec<Option<Account>> =
-        chosen.iter().map(|c| c.as_ref().map(|c| Account { law: c.fit.law, free: c.fit.free.clone() })).collect();
+    let beside = accounts(chosen);
     let constant = |kind: &(Kind, f64)| matches!(kind.0, Kind::Bias | Kind::Offset);
     let has_constant: Vec<bool> =
         chosen.iter().map(|c| c.as_ref().is_some_and(|c| c.kinds.iter().any(constant))).collect();
@@ -338,32 +392,12 @@ pub fn look(
     };
     put(joints, &plain);
     let perfect: Vec<f64> = joints.iter().map(tracking).collect();
-    // What more steps of the same account take away speaks for no effect.
+    // What more rounds of the same account take away speaks for no effect.
     let fits = fit_all(joints, &beside, STEPS * LOCAL);
     let mut outcome = Outcome { found: None, ties: Vec::new() };
     for whole in Whole::ALL.into_iter().filter(|whole| !without.contains(whole)) {
-        let probes = whole.probes(model);
-        let probed: Option<Vec<Around>> = (0..whole.numbers())
-            .map(|i| {
-                // A first moment needs a mass to sit on; what that mass does itself is taken off again.
-                let mut values = vec![0.0; probes.len()];
-                values[i] = probes[i];
-                let base = if whole == Whole::Payload && i > 0 { probes[0] } else { 0.0 };
-                if base > 0.0 {
-                    values[0] = base;
-                }
-                let there = around(&changed(model, &[whole.effect(model, &values)?])?, motions);
-                if base == 0.0 {
-                    return Some(there);
-                }
-                let mut alone = vec![0.0; probes.len()];
-                alone[0] = base;
-                let alone = around(&changed(model, &[whole.effect(model, &alone)?])?, motions);
-                Some(shifted(&plain, &alone, &there))
-            })
-            .collect();
-        let Some(probed) = probed else { continue };
-        let search = Search { whole, model, motions, plain: &plain, probed: &probed, probes: &probes };
+        let Some(search) = Search::new(whole, model, motions, &plain) else { continue };
+        let none = vec![0.0; whole.numbers()];
         put(joints, &plain);
         let price = |fits: &[Option<Fit>]| {
             let samples: f64 = joints
@@ -376,12 +410,12 @@ pub fn look(
         let cost = price(&fits);
         let mut tried: Vec<(f64, Settled, f64)> = Vec::new();
         if search.promise(joints, &fits) > 0.5 * cost
-            && let Some(settled) = search.settle(joints, &beside)
+            && let Some(settled) = search.settle(joints, &beside, &none)
         {
             tried.push((nats(joints, &fits, &settled.fits) - cost, settled, 0.0));
         }
         if has_constant.iter().any(|has| *has)
-            && let Some(settled) = search.settle(joints, &instead)
+            && let Some(settled) = search.settle(joints, &instead, &none)
         {
             let saved: f64 = (0..joints.len())
                 .filter_map(|j| {
@@ -407,17 +441,60 @@ pub fn look(
         let nats = nats.min(settled.nats() - cost + saved);
         let possible = !whole.at_bound(model, &settled.values);
         if nats > TAKEN && relevant && possible && outcome.found.as_ref().is_none_or(|found| nats > found.nats) {
-            let covariance = settled
-                .normal
-                .clone()
-                .try_inverse()
-                .unwrap_or_else(|| DMatrix::from_diagonal_element(probes.len(), probes.len(), 1e6));
-            let laws = settled.fits.iter().map(|fit| fit.as_ref().map(|fit| fit.law)).collect();
+            let (covariance, laws) = (settled.covariance(), settled.laws());
             outcome.found = Some(Found { whole, values: settled.values, covariance, nats, share, laws });
         }
     }
     put(joints, &plain);
     outcome
+}
+
+/// The numbers of an effect that was found, anew: beside what the joints were found to have next to it, or beside nothing, which
+/// its first numbers may have called up. Leaves the joints in the surroundings of the model that it is given.
+pub fn refine(
+    model: &Model,
+    motions: &[Motion],
+    joints: &mut [Joint],
+    chosen: &[Option<Chosen>],
+    found: &Found,
+) -> Option<Found> {
+    let plain = around(model, motions);
+    let search = Search::new(found.whole, model, motions, &plain)?;
+    let beside = accounts(chosen);
+    let bare: Vec<Option<Account>> =
+        chosen.iter().zip(joints.iter()).map(|(own, joint)| own.as_ref().map(|own| bare(own, joint))).collect();
+    let mut settle = |accounts: &[Option<Account>]| {
+        let settled = search.settle(joints, accounts, &found.values)?;
+        (!found.whole.at_bound(model, &settled.values)).then_some(settled)
+    };
+    let settled: Vec<Settled> = [&beside, &bare].into_iter().filter_map(|accounts| settle(accounts)).collect();
+    put(joints, &plain);
+    let samples = settled.first().map(|settled| worth(joints, &settled.fits))?;
+    let price = |fits: &[Option<Fit>]| -> f64 {
+        let of = |(fit, samples): (&Option<Fit>, &f64)| {
+            fit.as_ref().map_or(0.0, |fit| 0.5 * fit.free.len() as f64 * samples.max(2.0).ln())
+        };
+        fits.iter().zip(&samples).map(of).sum()
+    };
+    let score = |settled: &Settled| misfit(&settled.fits, &samples) + price(&settled.fits);
+    let settled = settled.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
+    let (covariance, laws) = (settled.covariance(), settled.laws());
+    Some(Found { values: settled.values, covariance, laws, ..*found })
+}
+
+/// The account of a joint without any kind.
+fn bare(own: &Chosen, joint: &Joint) -> Account {
+    let mut account = Account { law: own.fit.law, free: own.fit.free.clone() };
+    for (kind, _) in &own.kinds {
+        kind.clear(&mut account.law, &joint.start, &[]);
+        account.free.retain(|param| !kind.parameters().iter().any(|(own, _, _)| own == param));
+    }
+    account
+}
+
+fn accounts(chosen: &[Option<Chosen>]) -> Vec<Option<Account>> {
+    let of = |own: &Chosen| Account { law: own.fit.law, free: own.fit.free.clone() };
+    chosen.iter().map(|own| own.as_ref().map(of)).collect()
 }
 
 /// Nats by which richer fits are ahead of poorer ones, before what they cost.

@@ -8,6 +8,8 @@ use maud::{Markup, html};
 
 /// Kinds that a joint of a URDF or an MJCF has a number for.
 const CARRIED: [&str; 3] = ["coulomb_friction", "viscous_friction", "armature"];
+/// Kinds that an actuator has a number for: its gains and its limit.
+const DRIVEN: [&str; 3] = ["torque_saturation", "servo_gain_error", "servo_damping_error"];
 
 /// The boxes; `None` where no joint's torque is determined.
 pub fn render(diagnosis: &Diagnosis, corrected: &ServoModel) -> Option<Markup> {
@@ -21,8 +23,9 @@ pub fn render(diagnosis: &Diagnosis, corrected: &ServoModel) -> Option<Markup> {
     if actuators.is_empty() && mjcf.is_empty() {
         return None;
     }
+    let is_there = |kind: &str| CARRIED.contains(&kind) || (!actuators.is_empty() && DRIVEN.contains(&kind));
     let lacking: Vec<String> =
-        diagnosis.effects.iter().map(|e| e.kind.clone()).filter(|kind| !CARRIED.contains(&kind.as_str())).collect();
+        diagnosis.effects.iter().map(|e| e.kind.clone()).filter(|kind| !is_there(kind)).collect();
     let open: Vec<String> = diagnosis.joints.iter().filter(|joint| !known(joint)).cloned().collect();
     let boxed = |id: &str, title: &str, lines: &[String]| {
         html! { @if !lines.is_empty() { div { h3 { (title) } (reproduce::boxed(id, &lines.join("\n"))) } } }
@@ -35,7 +38,7 @@ pub fn render(diagnosis: &Diagnosis, corrected: &ServoModel) -> Option<Markup> {
             (boxed("paste-actuators", "Actuators of an MJCF, driven by the set points", &actuators))
         }
         @if !lacking.is_empty() {
-            p.note { "Left out, as neither has a number for it: " (words::list(&words::effects(&lacking), "and")) ". corrected.json has them." }
+            p.note { "Left out, as no box has a number for it: " (words::list(&words::effects(&lacking), "and")) ". corrected.json has them." }
         }
         @if !open.is_empty() {
             p.note { "Left out, as the logs tell ratios alone of its torques: " (words::joints(&open, &diagnosis.joints)) "." }

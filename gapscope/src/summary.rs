@@ -11,7 +11,7 @@ use crate::report::terminal::{INDENT, Paint, block, blocks, clean, column, fill,
 use crate::report::{
     account, beside_the_answer, capital, changed, count, effect, effects, figure, headline, implied_unit, in_words,
     interval, is_above_floor, joint_list, largest, list, motion_unit, outstanding, percent, percent_figure,
-    plain as rounded, power_line, regime, sentences, significant, verdict, with_unit, words_of_the_rest,
+    plain as rounded, power_line, regime, rolled_out, sentences, significant, verdict, with_unit, words_of_the_rest,
 };
 use change::Cells;
 use gapscope_datasets::{Doubt, Fault};
@@ -24,8 +24,6 @@ const REGIMES: usize = 3;
 const SUMS: usize = 4;
 const FINDINGS: usize = 3;
 const LOGS: usize = 12;
-/// A rollout further than this from its log, rad or m, goes nowhere.
-const LOST: f64 = 1e3;
 
 /// The three sentences of the answer, and nothing else.
 pub fn answer(diagnosis: &Diagnosis, paint: &Paint) -> String {
@@ -276,11 +274,6 @@ fn how_far(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Vec<String> 
         format!("{}  {text}{note}", pad(head, name))
     };
     cells.iter().map(row).collect()
-}
-
-/// The error of a rollout; one that has left every robot's reach says so.
-fn rolled_out(error: f64) -> String {
-    if error.is_finite() && error < LOST { figure(error) } else { "diverges".into() }
 }
 
 /// On a terminal the gravest findings, wrapped; elsewhere all of them.

@@ -44,6 +44,19 @@ pub fn significant(value: f64, digits: i32) -> String {
     }
 }
 
+/// A rollout further than this from its log, rad or m, goes nowhere.
+const LOST: f64 = 1e3;
+
+/// Whether the error of a rollout says that it goes nowhere; one that is not known does.
+pub fn is_lost(error: f64) -> bool {
+    error.is_nan() || error >= LOST
+}
+
+/// The error of a rollout; one that has left every robot's reach says so.
+pub fn rolled_out(error: f64) -> String {
+    if is_lost(error) { "diverges".into() } else { figure(error) }
+}
+
 /// Three significant digits.
 pub fn figure(value: f64) -> String {
     significant(value, 3)

@@ -51,7 +51,7 @@ pub use answer::{changed, headline, is_above_floor};
 pub use axis::Axis;
 pub use format::{
     NONE, Printed, count, estimate, figure, percent, percent_figure, percent_interval, percent_within, plain,
-    probability_figure, significant, span, with_unit,
+    probability_figure, rolled_out, significant, span, with_unit,
 };
 pub use heatmap::picture as heatmap_picture;
 pub use index::{Entry, Found, page as index_page};

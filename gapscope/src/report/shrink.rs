@@ -3,7 +3,7 @@
 use super::axis::{Axis, extent};
 use super::bars::{self, Bar};
 use super::chart::{Plot, band, dots, line};
-use super::format::{figure, percent_interval, percent_within, plain};
+use super::format::{figure, is_lost, percent_interval, percent_within, plain, rolled_out};
 use super::words;
 use gapscope_diagnosis::schema::{Change, Diagnosis, HorizonChange, Regime, Shrink};
 use maud::{Markup, html};
@@ -23,16 +23,16 @@ pub fn render(diagnosis: &Diagnosis) -> Markup {
 
 fn table(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Markup {
     let (position, velocity) = (words::motion_unit(regimes, false), words::motion_unit(regimes, true));
-    let row = |name: &str, of: &str, change: &Change| {
+    let row = |name: &str, of: &str, change: &Change, print: fn(f64) -> String| {
         html! {
             tr {
                 th scope="row" { span.nowrap { (name) } @if !of.is_empty() { span.wide { ", " (of) } } }
-                td.number { (figure(change.gaps()[0])) }
+                td.number { (print(change.gaps()[0])) }
                 @if corrected {
-                    td.number { (figure(change.gaps()[1])) }
+                    td.number { (print(change.gaps()[1])) }
                     td.number {
                         b { (part(change)) }
-                        @if let Some(ends) = change.ci95 { " " small { (percent_interval(ends)) } }
+                        @if let Some(ends) = change.ci95.filter(|_| compares(change)) { " " small { (percent_interval(ends)) } }
                     }
                 }
             }
@@ -52,9 +52,9 @@ fn table(shrink: &Shrink, regimes: &[Regime], corrected: bool) -> Markup {
                 }
             }
             tbody {
-                (row("torque", "of effort std", &shrink.torque))
-                (row("one step", velocity, &shrink.one_step))
-                @for h in &shrink.rollout { (row(&format!("rollout {} s", plain(h.horizon)), position, &h.change)) }
+                (row("torque", "of effort std", &shrink.torque, figure))
+                (row("one step", velocity, &shrink.one_step, figure))
+                @for h in &shrink.rollout { (row(&format!("rollout {} s", plain(h.horizon)), position, &h.change, known_or_lost)) }
             }
         } }
         p.note {
@@ -72,11 +72,22 @@ fn changes(shrink: &Shrink) -> impl Iterator<Item = &Change> {
 /// By what part a gap shrinks, in words where there is no part.
 pub fn part(change: &Change) -> String {
     match (change.before, change.shrink) {
+        _ if !compares(change) => "–".into(),
         (_, Some(part)) => percent_within(part, change.ci95),
         // A joint without inertia cannot be stepped, and a model that diverges has no error.
         (None, None) => "–".into(),
         (Some(_), None) => "at the floor".into(),
     }
+}
+
+/// The error of a rollout; a dash where the model cannot be simulated at all.
+fn known_or_lost(error: f64) -> String {
+    if error.is_nan() { figure(error) } else { rolled_out(error) }
+}
+
+/// Whether both models go somewhere.
+fn compares(change: &Change) -> bool {
+    !change.gaps().into_iter().any(is_lost)
 }
 
 /// What a dash before the effects means.
@@ -134,14 +145,19 @@ fn horizon(rollout: &[HorizonChange], regimes: &[Regime], corrected: bool) -> Ma
     let places: Vec<f64> = rollout.iter().map(|h| h.horizon).collect();
     let ends: Vec<[f64; 3]> = rollout
         .iter()
+        .filter(|h| compares(&h.change))
         .filter_map(|h| {
             let [low, high] = h.change.ci95?;
             Some([h.horizon, h.change.gaps()[0] * (1.0 - high), h.change.gaps()[0] * (1.0 - low)])
         })
         .collect();
-    let before: Vec<[f64; 2]> = rollout.iter().filter_map(|h| Some([h.horizon, h.change.before?])).collect();
-    let after: Vec<[f64; 2]> =
-        if corrected { rollout.iter().map(|h| [h.horizon, h.change.gaps()[1]]).collect() } else { vec![] };
+    // A model that goes nowhere has no line there.
+    let line_of = |model: usize| -> Vec<[f64; 2]> {
+        let all = rollout.iter().map(|h| [h.horizon, h.change.gaps()[model]]);
+        all.filter(|[_, error]| !is_lost(*error)).collect()
+    };
+    let before = line_of(0);
+    let after = if corrected { line_of(1) } else { vec![] };
     let x = Axis::places(&places, "horizon, s");
     let values = before.iter().chain(&after).map(|p| p[1]).chain(ends.iter().flat_map(|e| [e[1], e[2]]));
     let values: Vec<f64> = values.collect();
@@ -198,5 +214,10 @@ mod tests {
         // A gap that was noise already is another thing.
         let floor = Change { before: Some(0.1), after: Some(0.1), shrink: None, ci95: None };
         assert_eq!(part(&floor), "at the floor");
+        // 10¹¹ rad are no figure, and what is better than that is no shrink.
+        let lost = Change { before: Some(5e11), after: Some(300.0), shrink: Some(0.999), ci95: None };
+        diagnosis.shrink.rollout.iter_mut().for_each(|h| h.change = lost.clone());
+        let page = render(&diagnosis).into_string();
+        assert!(page.contains("diverges") && !page.contains("10¹¹") && !page.contains("99.9 %"), "{page}");
     }
 }

@@ -3,7 +3,8 @@
 use crate::cli::Input;
 use crate::diagnose::{with_progress, write};
 use crate::input::load;
-use crate::report::terminal::Paint;
+use crate::report::terminal::{Paint, wrap};
+use crate::summary::ordinary_spaces;
 use crate::{output, summary};
 use anyhow::{Context, Result};
 use clap::Args;
@@ -71,8 +72,10 @@ pub fn run(args: &Demo) -> Result<String> {
     write(&outcome, &setting, &out)?;
     let mut text =
         format!("A 7-joint arm moves with an effect that its model lacks; its logs are in {}.\n\n", out.display());
-    text.push_str(&summary::summary(&outcome.diagnosis, Some(&out.join("report.html")), &Paint::here()));
-    let _ = write!(text, "\nWithheld until now (gapscope demo --seed {seed}):\n{}", reveal(&withheld));
+    let report = out.join("report.html");
+    text.push_str(&summary::summary(&outcome.diagnosis, setting.ledgers.first(), Some(&report), &Paint::here()));
+    let width = Paint::here().width;
+    let _ = write!(text, "\nWithheld until now (gapscope demo --seed {seed}):\n{}", reveal(&withheld, width));
     Ok(text)
 }
 
@@ -121,16 +124,27 @@ fn withheld(robot: &Model, seed: u64) -> Vec<Effect> {
     vec![effect]
 }
 
-fn reveal(effects: &[Effect]) -> String {
-    let mut text = String::new();
+/// A space at which no line is broken.
+const UNBROKEN: &str = "\u{a0}";
+
+/// Each kind with its numbers, those of one name in one row.
+fn reveal(effects: &[Effect], width: usize) -> String {
+    let mut lines = Vec::new();
     for effect in effects {
-        let _ = writeln!(text, "  {}", effect.kind());
+        let mut rows: Vec<(String, String, Vec<String>)> = Vec::new();
         for p in effect.law().parameters() {
-            let joint = p.joint.map_or_else(String::new, |j| format!(" {j}"));
-            let values: Vec<String> = p.value.iter().map(|v| format!("{:.4}", v)).collect();
-            let unit = if p.unit == "-" { "" } else { p.unit };
-            let _ = writeln!(text, "    {}{joint}: {} {unit}", p.name, values.join(" "));
+            let values: Vec<String> = p.value.iter().map(|v| ((v * 1e4).round() / 1e4).to_string()).collect();
+            let told = p.joint.iter().cloned().chain(values).collect::<Vec<_>>().join(UNBROKEN);
+            let unit = if p.unit == "-" { String::new() } else { format!(" {}", p.unit).replace(' ', UNBROKEN) };
+            match rows.iter_mut().find(|row| row.0 == p.name && row.1 == unit) {
+                Some(row) => row.2.push(told),
+                None => rows.push((p.name.to_owned(), unit, vec![told])),
+            }
         }
+        lines.extend(
+            rows.into_iter().map(|(name, unit, all)| format!("{}, {name}: {}{unit}", effect.kind(), all.join(", "))),
+        );
     }
-    text
+    let wrapped = lines.iter().flat_map(|line| wrap(line, width - 2)).map(|line| format!("  {line}"));
+    ordinary_spaces(&wrapped.collect::<Vec<_>>())
 }

@@ -152,8 +152,9 @@ impl Found {
     /// The answer in some lines, as wide and colourful as where it is written.
     pub fn summary(&self, out: Option<&Path>, paint: &Paint) -> String {
         match self {
-            Found::Torque(outcome, _) => {
-                summary::summary(&outcome.diagnosis, out.map(|out| out.join("report.html")).as_deref(), paint)
+            Found::Torque(outcome, setting) => {
+                let report = out.map(|out| out.join("report.html"));
+                summary::summary(&outcome.diagnosis, setting.ledgers.first(), report.as_deref(), paint)
             }
             Found::Servo(outcome, beside) => servo::summary(&outcome.diagnosis, beside, out, paint),
         }

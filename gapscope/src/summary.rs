@@ -16,6 +16,7 @@ use crate::report::{
 use change::Cells;
 use gapscope_datasets::{Doubt, Fault};
 use gapscope_diagnosis::schema::{Diagnosis, Evaluation, FoundEffect, Regime, Shrink, Verdict, Why};
+use gapscope_export::TargetLedger;
 use std::path::Path;
 
 /// Effects, regimes, rollouts and findings shown; the rest is counted.
@@ -23,6 +24,7 @@ const EFFECTS: usize = 5;
 const REGIMES: usize = 3;
 const SUMS: usize = 4;
 const FINDINGS: usize = 3;
+const CHANGES: usize = 7;
 const LOGS: usize = 12;
 
 /// The three sentences of the answer, and nothing else.
@@ -55,8 +57,9 @@ pub fn faults(faults: &[Fault], doubts: &[Doubt], paint: &Paint) -> Vec<String> 
     lines
 }
 
-/// The diagnosis in some 25 lines: faults, the answer, ties, which, where, how far, notes, and where the report is.
-pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> String {
+/// The diagnosis in some 25 lines: faults, the answer, ties, which, where, how far, notes, what to change in the robot's own
+/// description where its `ledger` is there, and where the report is.
+pub fn summary(diagnosis: &Diagnosis, ledger: Option<&TargetLedger>, out: Option<&Path>, paint: &Paint) -> String {
     let data = &diagnosis.data;
     // An answer of wrong logs is none: what is wrong with them comes before it.
     let mut lines = faults(&data.faults, &data.doubts, paint);
@@ -96,11 +99,36 @@ pub fn summary(diagnosis: &Diagnosis, out: Option<&Path>, paint: &Paint) -> Stri
     if let Some(next) = &diagnosis.next_experiment {
         block(&mut lines, paint, "Next", &[effort.say(&clean(&sentences(&in_words(&next.motion))))]);
     }
+    block(&mut lines, paint, "Change", &ledger.and_then(changes).into_iter().collect::<Vec<_>>());
     let mut text = ordinary_spaces(&lines);
     if let Some(out) = out {
         text += &format!("{} {}\n", paint.head(&pad("Report", INDENT - 1)), out.display());
     }
     text
+}
+
+/// What to change at the joints of the robot's own description; `None` where nothing is a number of one joint.
+fn changes(ledger: &TargetLedger) -> Option<String> {
+    let format = if ledger.target == "mjcf" { "MJCF" } else { "URDF" };
+    // Where a number changes, those that are nothing beside it say nothing.
+    let bare = |text: &str| {
+        let attributes = text.trim_start_matches("<dynamics ").trim_end_matches("/>");
+        let all: Vec<String> = attributes.split("\" ").map(|one| one.replace("=\"", " ").replace('"', "")).collect();
+        let some: Vec<String> = all.iter().filter(|one| !one.ends_with(" 0")).cloned().collect();
+        if some.is_empty() { all.join(", ") } else { some.join(", ") }
+    };
+    let mut joints: Vec<String> = ledger
+        .paste
+        .iter()
+        .filter_map(|line| line.split_once(": "))
+        .map(|(joint, text)| format!("{joint} {}", bare(text)).replace(' ', "\u{a0}"))
+        .collect();
+    if joints.len() > CHANGES {
+        let more = joints.len() - CHANGES;
+        joints.truncate(CHANGES);
+        joints.push(format!("and {more} more in the report"));
+    }
+    (!joints.is_empty()).then(|| clean(&format!("in the {format}: {}", joints.join("; "))))
 }
 
 /// What the logs cannot tell apart, a line each.

@@ -27,6 +27,16 @@ impl Record<'_> {
         set.sort_unstable();
         let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
         let with = chosen.with(Choice { set }, exact, fit);
-        Ok(if with.odds_against(&chosen, self)? > 0.0 { with } else { chosen })
+        if with.odds_against(&chosen, self)? <= 0.0 {
+            return Ok(chosen);
+        }
+        // What a law was refined by beside them it may be without them.
+        let mut all = chosen.all.clone();
+        for (&c, refined) in with.choice.set.iter().zip(&with.exact.entries) {
+            all.entries[c].candidate = refined.candidate.clone();
+        }
+        let (exact, fit) = self.data(&chosen.noise).exact(&all, &chosen.choice.set, chosen.turned.as_ref())?;
+        let without = chosen.with(chosen.choice.clone(), exact, fit);
+        Ok(if with.odds_against(&without, self)? > 0.0 { with } else { without })
     }
 }

@@ -79,7 +79,7 @@ fn write(folder: &Path, log: &Log, out: &Path) -> Result<String> {
         }
     }
     output::write(&page, &markdown(log, &outcome, &others, names.each_ref().map(|name| name.as_deref())))?;
-    Ok(summary::summary(diagnosis, None, &Paint::plain()))
+    Ok(summary::summary(diagnosis, None, None, &Paint::plain()))
 }
 
 /// Page and pictures of a log.

@@ -5,7 +5,7 @@ use crate::report::sample;
 use crate::report::terminal::WIDTH;
 
 fn summary(diagnosis: &Diagnosis, out: Option<&Path>, color: bool) -> String {
-    super::summary(diagnosis, out, &Paint { terminal: color, color, width: WIDTH })
+    super::summary(diagnosis, None, out, &Paint { terminal: color, color, width: WIDTH })
 }
 
 #[test]
@@ -78,11 +78,33 @@ fn a_narrow_terminal_gets_narrow_lines_and_every_word() {
     let (_, mut diagnosis, _) = sample::explained();
     diagnosis.data.findings =
         vec!["the clock of the second log jumps by three seconds at sample 400, and once more later".into()];
-    let wide = super::summary(&diagnosis, None, &Paint { terminal: true, color: false, width: 100 });
-    let narrow = super::summary(&diagnosis, None, &Paint { terminal: true, color: false, width: 60 });
+    let wide = super::summary(&diagnosis, None, None, &Paint { terminal: true, color: false, width: 100 });
+    let narrow = super::summary(&diagnosis, None, None, &Paint { terminal: true, color: false, width: 60 });
     assert!(narrow.lines().all(|line| line.chars().count() <= 60), "{narrow}");
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(words(&wide), words(&narrow));
+}
+
+#[test]
+fn says_what_to_change_in_the_robots_own_description() {
+    let (_, diagnosis, _) = sample::explained();
+    let more = (2..=9).map(|j| format!("joint{j}: <dynamics damping=\"0.{j}\" friction=\"1.5\"/>"));
+    let paste = std::iter::once("joint1: <dynamics damping=\"0\" friction=\"2.5\"/>".into()).chain(more).collect();
+    let ledger = TargetLedger {
+        target: "urdf".into(),
+        file: "robot.urdf".into(),
+        shrink: None,
+        shrink_here: None,
+        effects: vec![],
+        paste,
+        notes: vec![],
+    };
+    let text = super::summary(&diagnosis, Some(&ledger), None, &Paint::plain());
+    let told = text.split("\nChange").nth(1).unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.starts_with("in the URDF: joint1 friction 2.5; joint2 damping 0.2, friction 1.5"), "{told}");
+    assert!(told.contains("joint7 damping") && told.contains("; and 2 more in the report"), "{told}");
+    let none = TargetLedger { paste: vec![], ..ledger };
+    assert!(!super::summary(&diagnosis, Some(&none), None, &Paint::plain()).contains("Change"));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! A limit of the drive's torque beside other effects.
 
 use gapscope_datasets::{Recipe, Sensors, generate};
+use gapscope_diagnosis::schema::{Parameter, Quantity};
 use gapscope_effects::{Effect, LoadDependentFriction, TorqueSaturation};
 use gapscope_tests::{diagnose, robot};
 
@@ -22,4 +23,18 @@ fn a_limit_is_found_where_the_effort_is_noisy() {
     let limit = found.iter().find(|e| e.kind == "torque_saturation").unwrap_or_else(|| panic!("{found:#?}"));
     assert_eq!(limit.joints, ["joint1"]);
     assert!(found.iter().any(|e| e.kind == "load_dependent_friction"), "{found:#?}");
+}
+
+#[test]
+fn a_limit_alone_is_found_to_a_part_in_a_thousand_and_no_rotor_beside_it() {
+    let model = robot("arm6");
+    let limit = 21.5;
+    let effect = Effect::TorqueSaturation(TorqueSaturation { limit: [("joint3".to_owned(), limit)].into() });
+    let log = |seed| generate(&model, std::slice::from_ref(&effect), seed, &Recipe::default(), "log.csv").unwrap();
+    let found = diagnose(&model, &[log(0), log(1)]).diagnosis.effects;
+    let [only] = found.as_slice() else { panic!("{found:#?}") };
+    assert_eq!((only.kind.as_str(), only.joints.as_slice()), ("torque_saturation", &["joint3".to_owned()][..]));
+    let Some(Parameter::PerJoint(limits)) = only.parameters.get("limit") else { panic!("{only:#?}") };
+    let Quantity::Scalar(value) = limits["joint3"].value else { panic!("{limits:?}") };
+    assert!((value / limit - 1.0).abs() < 1e-3, "{limits:?}");
 }

@@ -4,6 +4,7 @@ use crate::cli::Input;
 use crate::diagnose::{with_progress, write};
 use crate::input::load;
 use crate::report::terminal::{Paint, wrap};
+use crate::report::with_unit;
 use crate::summary::ordinary_spaces;
 use crate::{output, summary};
 use anyhow::{Context, Result};
@@ -124,25 +125,22 @@ fn withheld(robot: &Model, seed: u64) -> Vec<Effect> {
     vec![effect]
 }
 
-/// A space at which no line is broken.
-const UNBROKEN: &str = "\u{a0}";
-
 /// Each kind with its numbers, those of one name in one row.
 fn reveal(effects: &[Effect], width: usize) -> String {
     let mut lines = Vec::new();
     for effect in effects {
-        let mut rows: Vec<(String, String, Vec<String>)> = Vec::new();
+        let mut rows: Vec<(&str, &str, Vec<String>)> = Vec::new();
         for p in effect.law().parameters() {
             let values: Vec<String> = p.value.iter().map(|v| ((v * 1e4).round() / 1e4).to_string()).collect();
-            let told = p.joint.iter().cloned().chain(values).collect::<Vec<_>>().join(UNBROKEN);
-            let unit = if p.unit == "-" { String::new() } else { format!(" {}", p.unit).replace(' ', UNBROKEN) };
-            match rows.iter_mut().find(|row| row.0 == p.name && row.1 == unit) {
+            let told = p.joint.iter().cloned().chain(values).collect::<Vec<_>>().join("\u{a0}");
+            match rows.iter_mut().find(|row| (row.0, row.1) == (p.name, p.unit)) {
                 Some(row) => row.2.push(told),
-                None => rows.push((p.name.to_owned(), unit, vec![told])),
+                None => rows.push((p.name, p.unit, vec![told])),
             }
         }
         lines.extend(
-            rows.into_iter().map(|(name, unit, all)| format!("{}, {name}: {}{unit}", effect.kind(), all.join(", "))),
+            rows.iter()
+                .map(|(name, unit, all)| format!("{}, {name}: {}", effect.kind(), with_unit(&all.join(", "), unit))),
         );
     }
     let wrapped = lines.iter().flat_map(|line| wrap(line, width - 2)).map(|line| format!("  {line}"));

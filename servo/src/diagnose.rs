@@ -233,10 +233,7 @@ fn find_wholes(
     let (mut real, mut found) = (model.clone(), Vec::<Found>::new());
     loop {
         let taken: Vec<Whole> = found.iter().map(|found| found.whole).collect();
-        let looked = match excerpt::of_arm(joints, moved) {
-            Some((mut joints, moved)) => look(&real, &moved, &mut joints, chosen, &taken),
-            None => look(&real, moved, joints, chosen, &taken),
-        };
+        let looked = excerpt::with_arm(joints, moved, |joints, moved| look(&real, moved, joints, chosen, &taken));
         let Some(next) = looked.found else { return (found, looked.ties) };
         let Some(there) = with(&real, std::slice::from_ref(&next)) else { return (found, looked.ties) };
         let before = laws_of(chosen);
@@ -264,11 +261,8 @@ fn refine_all(
         let others: Vec<Found> =
             wholes.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, own)| own.clone()).collect();
         let Some(base) = with(model, &others) else { continue };
-        let refined = match excerpt::of_arm(joints, moved) {
-            Some((mut joints, moved)) => refine(&base, &moved, &mut joints, chosen, &wholes[at]),
-            None => refine(&base, moved, joints, chosen, &wholes[at]),
-        };
-        if let Some(refined) = refined {
+        let settle = |joints: &mut [Joint], moved: &[Motion]| refine(&base, moved, joints, chosen, &wholes[at]);
+        if let Some(refined) = excerpt::with_arm(joints, moved, settle) {
             (wholes[at], any) = (refined, true);
         }
     }

@@ -25,16 +25,20 @@ pub fn of_joint(joint: &Joint) -> Option<Joint> {
     Some(Joint { runs, ..joint.clone() })
 }
 
-/// All joints of an arm with the same pieces of their runs, spread evenly over those in which any moves, and how the arm moved
-/// in them: each piece is a log of its own. `None` where the logs are short.
-pub fn of_arm(joints: &[Joint], motions: &[Motion]) -> Option<(Vec<Joint>, Vec<Motion>)> {
-    let pieces = spread(joints.first()?, |piece| joints.iter().any(|joint| moves(joint, piece)))?;
+/// Works on all joints of an arm and how it moved: on the same pieces of all runs, each a log of its own, spread evenly over
+/// those in which any joint moves; on the joints themselves where the logs are short.
+pub fn with_arm<T>(joints: &mut [Joint], motions: &[Motion], work: impl FnOnce(&mut [Joint], &[Motion]) -> T) -> T {
+    let first = joints.first();
+    let Some(pieces) = first.and_then(|first| spread(first, |piece| joints.iter().any(|joint| moves(joint, piece))))
+    else {
+        return work(joints, motions);
+    };
     let of = |joint: &Joint| {
         let part = |(log, piece): (usize, &Piece)| Run { log, ..joint.runs[piece.run].part(piece.samples) };
         Joint { runs: pieces.iter().enumerate().map(part).collect(), ..joint.clone() }
     };
-    let motions = pieces.iter().map(|piece| motions[piece.run].part(piece.samples)).collect();
-    Some((joints.iter().map(of).collect(), motions))
+    let motions: Vec<Motion> = pieces.iter().map(|piece| motions[piece.run].part(piece.samples)).collect();
+    work(&mut joints.iter().map(of).collect::<Vec<_>>(), &motions)
 }
 
 /// Pieces of the runs of a joint, spread evenly over those that are wanted.

@@ -399,15 +399,8 @@ pub fn look(
         let Some(search) = Search::new(whole, model, motions, &plain) else { continue };
         let none = vec![0.0; whole.numbers()];
         put(joints, &plain);
-        let price = |fits: &[Option<Fit>]| {
-            let samples: f64 = joints
-                .iter()
-                .zip(fits)
-                .map(|(joint, fit)| fit.as_ref().map_or(0.0, |f| independent(joint, &f.errors)))
-                .sum();
-            0.5 * whole.numbers() as f64 * samples.max(2.0).ln() + COST
-        };
-        let cost = price(&fits);
+        let samples: f64 = worth(joints, &fits).iter().sum();
+        let cost = 0.5 * whole.numbers() as f64 * samples.max(2.0).ln() + COST;
         let mut tried: Vec<(f64, Settled, f64)> = Vec::new();
         if search.promise(joints, &fits) > 0.5 * cost
             && let Some(settled) = search.settle(joints, &beside, &none)

@@ -138,14 +138,13 @@ fn estimates(joint: &Joint, chosen: &Chosen, spread: &Spread, kind: Kind) -> Vec
             let ci95 = frequency.ci95.map(|end| end.map(|end| stiffness(end.max(0.0))));
             Estimate::new(Interval { value: stiffness(frequency.value), ci95 }, unit)
         } else if param.is_torque() {
-            let mut interval = spread.torque(param, law[param], sigma);
+            // Friction at rest is what it is at speed, and the rise on top.
+            let at_rest = [Param::Rise, Param::Coulomb];
+            let sum = if (kind, param) == (Kind::Stribeck, Param::Rise) { &at_rest[..] } else { &[param] };
+            let mut interval = spread.torque(sum, law);
             let known = spread.scale_is_known();
-            let base = match (kind, param) {
-                // Friction at rest is what it is at speed, and the rise on top.
-                (Kind::Stribeck, Param::Rise) => spread.torque(Param::Coulomb, law[Param::Coulomb], sigma).value,
-                (Kind::DampingError, _) => -joint.start[Param::Damping] / if known { sigma } else { 1.0 },
-                _ => 0.0,
-            };
+            let over = if known { sigma } else { 1.0 };
+            let base = if kind == Kind::DampingError { -joint.start[Param::Damping] / over } else { 0.0 };
             interval.value += base;
             interval.ci95 = interval.ci95.map(|end| end.map(|end| end + base));
             Estimate::new(interval, &unit_of(unit, joint.signal, known))
@@ -211,7 +210,7 @@ pub fn drive(
             let estimate = match param {
                 Param::Scale => Estimate::new(spread.scale(sigma), &format!("N m/{}", joint.signal.unit())),
                 Param::Damping | Param::Feedforward => {
-                    Estimate::new(spread.torque(param, law[param], sigma), &unit_of("N m s/rad", joint.signal, known))
+                    Estimate::new(spread.torque(&[param], law), &unit_of("N m s/rad", joint.signal, known))
                 }
                 Param::Limit => Estimate::new(spread.plain(param, law[param]), joint.signal.unit()),
                 Param::Latency => Estimate::new(spread.plain(param, law[param]), "s"),

@@ -22,6 +22,7 @@ use crate::schema::*;
 use crate::simulate::trace;
 use crate::together::{drop_what_the_arm_does_not_miss, is_missed};
 use crate::units;
+use crate::weigh::independent;
 use crate::whole::{Found, Whole, changed, look, refine, surround};
 use gapscope_datasets::{Episode, Trajectory};
 use gapscope_dynamics::Model;
@@ -34,6 +35,9 @@ const PARTLY: f64 = 0.6;
 /// How often each joint is looked at anew, in surroundings by what was found of the others: the first time by laws that were found
 /// beside the measured motion.
 const PASSES: usize = 2;
+/// By how much steps that tell numbers are finer than those of a search.
+const FINER: f64 = 4.0;
+const FINE_ROUNDS: usize = 4;
 /// Rounds of a fit with a fold left out: it begins where the whole fit ended.
 const FOLD: usize = 3;
 
@@ -106,6 +110,9 @@ pub fn diagnose(
         }
     }
     drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
+    progress("the numbers of each joint, by finer steps", 0.75);
+    let coarse = laws_of(&chosen);
+    sharpen(&mut all, &mut chosen);
     findings.extend(
         all.iter()
             .filter(|joint| !joint.moved)
@@ -122,8 +129,15 @@ pub fn diagnose(
     let (nominal, known) = nominal_laws(&all);
     let before = run_free(model, &nominal, &all);
     let after = held_out(&real, &laws, &chosen, &all);
-    let spreads: Vec<Option<Spread>> =
-        chosen.iter().zip(&all).map(|(c, joint)| c.as_ref().map(|c| Spread::of(&c.fit, joint))).collect();
+    let spreads: Vec<Option<Spread>> = chosen
+        .iter()
+        .zip(&all)
+        .zip(&coarse)
+        .map(|((c, joint), coarse)| {
+            let spread = Spread::of(&c.as_ref()?.fit, joint);
+            Some(coarse.map_or(spread.clone(), |coarse| spread.with_steps_from(&coarse, FINER)))
+        })
+        .collect();
     let floor: PerJoint = all.iter().map(|j| (j.name.clone(), j.encoder_step() / 12f64.sqrt())).collect();
     let logs = |errors: &'_ Errors| -> Vec<Vec<Vec<f64>>> { errors.clone() };
     let (before_logs, after_logs) = (logs(&before), logs(&after));
@@ -204,6 +218,16 @@ const CONSTANT: [Kind; 2] = [Kind::Bias, Kind::Offset];
 
 fn choose_all(joints: &mut [Joint], from: &[From]) -> Vec<Option<Chosen>> {
     joints.par_iter_mut().zip(from).map(|(joint, from)| joint.moved.then(|| choose(joint, from))).collect()
+}
+
+/// Numbers of what was chosen, by finer steps of the integrator than a search can afford.
+fn sharpen(joints: &mut [Joint], chosen: &mut [Option<Chosen>]) {
+    joints.par_iter_mut().zip(chosen).for_each(|(joint, own)| {
+        let Some(own) = own else { return };
+        joint.runs.iter_mut().for_each(|run| run.step_by(run.step / FINER));
+        own.fit = fit(&own.fit.law, &own.fit.free, &joint.runs, &joint.ranges, FINE_ROUNDS);
+        own.samples = independent(joint, &own.fit.errors);
+    });
 }
 
 fn laws_of(chosen: &[Option<Chosen>]) -> Vec<Option<Law>> {

@@ -6,7 +6,7 @@
 //! Source: Ljung, System Identification, 2nd ed., section 9.3; White, Econometrica 50(1) 1982.
 
 use crate::fit::{Fit, normal};
-use crate::law::Param;
+use crate::law::{Law, Param};
 use crate::prepare::Joint;
 use crate::simulate::errors;
 use nalgebra::DMatrix;
@@ -103,10 +103,26 @@ impl Spread {
         self.at(Param::Scale).is_none_or(|i| self.covariance[(i, i)].sqrt() <= KNOWN * self.values[i])
     }
 
+    /// The same where steps `finer` times as long led to another law: an error of first order in the step has a third of the
+    /// difference left at a quarter of it. Source: Richardson, Phil. Trans. R. Soc. A 210 (1911).
+    pub fn with_steps_from(mut self, coarse: &Law, finer: f64) -> Spread {
+        let left = |(param, value): (&Param, &f64)| (value - coarse[*param]) / (finer - 1.0);
+        let left = nalgebra::DVector::from_iterator(self.free.len(), self.free.iter().zip(&self.values).map(left));
+        self.covariance += &left * left.transpose();
+        self
+    }
+
+    /// Standard deviation of a sum of parameters, each times a factor; what is not free is known.
+    fn deviation_of(&self, sum: &[(Param, f64)]) -> f64 {
+        let free: Vec<(usize, f64)> = sum.iter().filter_map(|(param, by)| Some((self.at(*param)?, *by))).collect();
+        let variance =
+            |&(i, a): &(usize, f64)| -> f64 { free.iter().map(|&(j, b)| a * b * self.covariance[(i, j)]).sum() };
+        free.iter().map(variance).sum::<f64>().max(0.0).sqrt()
+    }
+
     /// A parameter as it stands in the law.
     pub fn plain(&self, param: Param, value: f64) -> Interval {
-        let deviation = self.at(param).map_or(0.0, |i| self.covariance[(i, i)].max(0.0).sqrt());
-        Interval { value, ci95: [Some(value - T975 * deviation), Some(value + T975 * deviation)] }
+        around(value, T975 * self.deviation_of(&[(param, 1.0)]))
     }
 
     /// 1/σ: torque per unit of what the drive follows.
@@ -119,18 +135,18 @@ impl Spread {
         Interval { value: 1.0 / sigma, ci95: [Some(1.0 / (sigma + half)), most] }
     }
 
-    /// A torque, a parameter over σ; in units of the drive's signal where the scale is not known.
-    pub fn torque(&self, param: Param, value: f64, sigma: f64) -> Interval {
+    /// A torque, the sum of parameters over σ; in units of the drive's signal where the scale is not known.
+    pub fn torque(&self, params: &[Param], law: &Law) -> Interval {
+        let (sum, sigma): (f64, f64) = (params.iter().map(|param| law[*param]).sum(), law[Param::Scale]);
         if !self.scale_is_known() {
-            return self.plain(param, value);
+            let parts: Vec<(Param, f64)> = params.iter().map(|param| (*param, 1.0)).collect();
+            return around(sum, T975 * self.deviation_of(&parts));
         }
-        let (by_param, by_sigma) = (1.0 / sigma, -value / (sigma * sigma));
-        let own = self.at(param).map_or(0.0, |i| self.covariance[(i, i)]);
-        let scale = self.at(Param::Scale).map_or(0.0, |i| self.covariance[(i, i)]);
-        let both = self.at(param).zip(self.at(Param::Scale)).map_or(0.0, |(i, j)| self.covariance[(i, j)]);
-        let variance = by_param * by_param * own + by_sigma * by_sigma * scale + 2.0 * by_param * by_sigma * both;
-        let half = T975 * variance.max(0.0).sqrt();
-        let value = value / sigma;
-        Interval { value, ci95: [Some(value - half), Some(value + half)] }
+        let parts = params.iter().map(|param| (*param, 1.0 / sigma)).chain([(Param::Scale, -sum / (sigma * sigma))]);
+        around(sum / sigma, T975 * self.deviation_of(&parts.collect::<Vec<_>>()))
     }
+}
+
+fn around(value: f64, half: f64) -> Interval {
+    Interval { value, ci95: [Some(value - half), Some(value + half)] }
 }

@@ -4,11 +4,16 @@
 
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
+use crate::run::Run;
 use crate::simulate::{STEP_PART, STEPS, simulate};
 
 /// An effect must lower the squared error by this share of what is left, and its square root by this share of perfect
 /// tracking's error: no servo is modelled to better, and no integrator is another's to better.
 const RELEVANT: [f64; 2] = [0.04, 0.005];
+
+/// By how much half a step may change a path, against what is left of the log or the encoder's rounding; and the shortest step, s.
+const FOLLOWS: f64 = 0.3;
+const FINEST: f64 = 5e-4;
 
 /// The least fall of a joint's squared error that counts, where `rest` is left and perfect tracking leaves `perfect`.
 pub fn least(rest: f64, perfect: f64) -> f64 {
@@ -60,6 +65,28 @@ pub fn independent(joint: &Joint, errors: &[f64]) -> f64 {
     total.max(4.0)
 }
 
+/// Steps by the longest of `length`, its half, its quarter … whose own error is small against what is left, or against the rounding of
+/// the encoder: what an integrator misses is told as an effect otherwise. Leaves the path.
+fn step_until_it_follows(law: &Law, run: &mut Run, mut length: f64, rounding: f64, path: &mut Vec<f64>) {
+    let mut finer = Vec::new();
+    run.step_by(length);
+    simulate(law, run, path);
+    while 0.5 * length >= FINEST {
+        run.step_by(0.5 * length);
+        simulate(law, run, &mut finer);
+        let rows = || path.iter().zip(&finer).zip(&run.position).zip(&run.stale).filter(|row| !row.1);
+        let (moved, left) = rows().fold((0.0, 0.0), |(moved, left), (((path, finer), position), _)| {
+            (moved + (path - finer).powi(2), left + (finer - position).powi(2))
+        });
+        if moved.sqrt() <= FOLLOWS * left.sqrt().max(rounding * (path.len() as f64).sqrt()) {
+            break;
+        }
+        length *= 0.5;
+        std::mem::swap(path, &mut finer);
+    }
+    run.step_by(length);
+}
+
 /// Weights each stretch of each log by its own level of error, so that a stretch with twice the error counts a quarter.
 /// The level is no less than the encoder's step.
 pub fn weigh(joint: &mut Joint, law: &Law) {
@@ -75,8 +102,7 @@ pub fn weigh(joint: &mut Joint, law: &Law) {
         .min(if law[Param::DeadBand] > 0.0 { 0.5 * law.coasting(inertia) } else { f64::INFINITY });
     let length = (STEP_PART * shortest).clamp(least, greatest);
     for run in &mut joint.runs {
-        run.step_by(length);
-        simulate(law, run, &mut path);
+        step_until_it_follows(law, run, length, step / 12f64.sqrt(), &mut path);
         let mut sums = [(0.0, 0.0); 2];
         for k in (0..path.len()).filter(|&k| !run.stale[k]) {
             let sum = &mut sums[usize::from(run.on[k])];

@@ -63,6 +63,8 @@ pub struct Motion {
     pub per: usize,
     /// True position, speed and acceleration, `[joint][row]`.
     state: Vec<[Vec<f64>; 3]>,
+    /// By how much each encoder shows more than the true position, rad.
+    offset: Vec<f64>,
 }
 
 impl Motion {
@@ -70,7 +72,14 @@ impl Motion {
     pub fn part(&self, [from, to]: [usize; 2]) -> Motion {
         let rows = from * self.per..=to * self.per;
         let part = |state: &[Vec<f64>; 3]| std::array::from_fn(|i| state[i][rows.clone()].to_vec());
-        Motion { per: self.per, state: self.state.iter().map(part).collect() }
+        Motion { per: self.per, state: self.state.iter().map(part).collect(), offset: self.offset.clone() }
+    }
+
+    /// The motion that encoders show of which this one shows so many rad more than the true position.
+    pub fn put_zero_off(&mut self, joint: usize, offset: f64) {
+        let moved = self.offset[joint] - offset;
+        self.state[joint][0].iter_mut().for_each(|q| *q += moved);
+        self.offset[joint] = offset;
     }
 }
 
@@ -111,7 +120,8 @@ pub fn motion(episode: &Episode, stale: &[bool], traces: &[Option<Trace>]) -> Mo
         }
         state
     });
-    Motion { per, state: state.collect() }
+    let offset = traces.iter().map(|trace| trace.as_ref().map_or(0.0, |trace| trace.offset)).collect();
+    Motion { per, state: state.collect(), offset }
 }
 
 /// The surroundings of each joint of a model that moves so.

@@ -47,6 +47,15 @@ impl Chosen {
         From::Account(self.fit.law, kinds.collect())
     }
 
+    /// Puts what the whole arm says of its encoder's zero in the place of what the joint alone said; nothing where it is right.
+    pub fn put_zero_off(&mut self, offset: Option<f64>) {
+        if offset.is_none() {
+            self.kinds.retain(|(kind, _)| *kind != Kind::Offset);
+            self.fit.free.retain(|param| *param != Param::Offset);
+        }
+        self.fit.law[Param::Offset] = offset.unwrap_or(0.0);
+    }
+
     /// The same without its spring or play.
     pub fn rigid(&self) -> From {
         match &self.poorer {
@@ -113,6 +122,24 @@ pub fn choose(joint: &mut Joint, from: &From) -> Chosen {
     }
     found.samples = independent(joint, &found.fit.errors);
     found
+}
+
+/// The fit of an account, from a law on, with those of some kinds that it misses: the one that is missed most first.
+pub fn restore(joint: &mut Joint, law: &Law, mut kinds: Vec<Kind>, mut among: Vec<Kind>) -> Fit {
+    let (choice, _, _) = begin(joint);
+    let mut best = choice.fit(law, &kinds, None, TRIAL);
+    loop {
+        let with = |(at, &kind): (usize, &Kind)| {
+            let with: Vec<Kind> = kinds.iter().copied().chain([kind]).collect();
+            let rich = choice.fit(&best.law, &with, Some(kind), TRIAL);
+            let nats = choice.nats(&rich, &best, kind, independent(choice.joint, &rich.errors));
+            (nats > TAKEN && choice.relevant(&rich, &best)).then_some((nats, at, rich))
+        };
+        let top = among.iter().enumerate().filter_map(with).max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, at, rich)) = top else { return best };
+        kinds.push(among.remove(at));
+        best = rich;
+    }
 }
 
 fn choose_by_all(joint: &mut Joint, from: &From) -> Chosen {

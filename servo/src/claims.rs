@@ -2,7 +2,7 @@
 
 use crate::choice::Comparison;
 use crate::choose::Chosen;
-use crate::interval::{Interval, Spread, T975};
+use crate::interval::{Interval, REACH, Spread};
 use crate::kinds::Kind;
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
@@ -24,7 +24,7 @@ pub fn confidence(nats: f64) -> f64 {
 
 /// The claim of an effect of the whole arm.
 pub fn whole_effect(found: &Found, model: &Model, joints: &[Joint]) -> FoundEffect {
-    let half = |i: usize| T975 * found.covariance[(i, i)].max(0.0).sqrt();
+    let half = |i: usize| REACH * found.covariance[(i, i)].max(0.0).sqrt();
     let number = |i: usize, unit: &str| {
         let (value, half) = (found.values[i], half(i));
         Estimate::new(Interval { value, ci95: [Some(value - half), Some(value + half)] }, unit)
@@ -37,13 +37,18 @@ pub fn whole_effect(found: &Found, model: &Model, joints: &[Joint]) -> FoundEffe
         }
         Whole::Payload => {
             let mass = found.values[0].max(1e-12);
-            let com: Vec<f64> = found.values[1..].iter().map(|moment| moment / mass).collect();
+            let com: Vec<f64> = found.values[1..4].iter().map(|moment| moment / mass).collect();
             let halves: Vec<f64> = (1..4).map(|i| half(i) / mass).collect();
             let end = |sign: f64| com.iter().zip(&halves).map(|(c, h)| c + sign * h).collect();
             let vector = Vector { value: com.clone(), ci95: [end(-1.0), end(1.0)], unit: "m".to_owned() };
             let own = [("mass", Parameter::Single(number(0, "kg"))), ("com", Parameter::Vector(vector))];
             let last = model.joints().last().map(|joint| joint.name.clone());
             (BTreeMap::from(own.map(|(name, own)| (name.to_owned(), own))), last.into_iter().collect())
+        }
+        Whole::Offset(joint) => {
+            let name = model.joints()[joint].name.clone();
+            let own = BTreeMap::from([(name.clone(), number(0, "rad"))]);
+            (BTreeMap::from([("offset".to_owned(), Parameter::PerJoint(own))]), vec![name])
         }
     };
     FoundEffect {

@@ -92,25 +92,25 @@ pub fn diagnose(
         }
         // Once more, in surroundings by what was found of the others.
         progress("each joint beside what was found of the others", 0.7 + 0.05 * pass as f64);
-        let begin = |(own, rigid): (&Option<Chosen>, From)| match own {
-            Some(own) if own.fit.law.winds_up() => rigid,
+        let begin = |(own, rigid): (&Option<Chosen>, &From)| match own {
+            Some(own) if own.fit.law.winds_up() => rigid.clone(),
             Some(own) => own.account(),
             None => From::Nothing,
         };
-        let accounts: Vec<From> = chosen.iter().zip(rigid).map(begin).collect();
-        let laws: Vec<Option<Law>> = accounts.iter().map(From::law).collect();
-        let moved = motions(&real, &all, &laws, episodes);
-        if refine_all(model, &moved, &mut all, &chosen, &mut wholes) {
-            real = with(model, &wholes).unwrap_or(real);
-            surround(&mut all, &real, &moved);
-            chosen = choose_all(&mut all, &nothing);
-        } else {
-            surround(&mut all, &real, &moved);
-            chosen = choose_all(&mut all, &accounts);
-        }
+        let laws: Vec<Option<Law>> = chosen.iter().zip(&rigid).map(|own| begin(own).law()).collect();
+        let had = !wholes.is_empty();
+        real = settle(model, &mut all, &mut chosen, &mut wholes, &laws, episodes).unwrap_or(real);
+        // What joints have beside an effect of the whole arm was found beside its first numbers.
+        let accounts: Vec<From> =
+            chosen.iter().zip(&rigid).map(|own| if had { From::Nothing } else { begin(own) }).collect();
+        chosen = choose_all(&mut all, &accounts);
     }
     drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
-    progress("the numbers of each joint, by finer steps", 0.75);
+    progress("the numbers of the arm and its joints, by finer steps", 0.85);
+    let laws = laws_of(&chosen);
+    if !laws.iter().flatten().any(Law::winds_up) {
+        real = settle(model, &mut all, &mut chosen, &mut wholes, &laws, episodes).unwrap_or(real);
+    }
     let coarse = laws_of(&chosen);
     sharpen(&mut all, &mut chosen);
     findings.extend(
@@ -119,7 +119,7 @@ pub fn diagnose(
             .map(|joint| format!("{}: does not move and is not told to; nothing is said of it", joint.name)),
     );
     findings.extend(nominal_rate(episodes));
-    progress("how far the arm's free run is from the logs", 0.8);
+    progress("how far the arm's free run is from the logs", 0.9);
     let weights = weights(&all, episodes);
     let bodies: Vec<Effect> = wholes.iter().filter_map(|found| found.whole.effect(model, &found.values)).collect();
     let law = |j: usize| chosen[j].as_ref().map_or(all[j].start_still(), |c| c.fit.law);
@@ -176,7 +176,7 @@ pub fn diagnose(
             (joint.name.clone(), drive(joint, law, c.as_ref(), spread.as_ref(), episodes))
         })
         .collect();
-    progress("what to log next", 0.9);
+    progress("what to log next", 0.95);
     let each: Vec<experiment::Found> = all
         .iter()
         .zip(chosen.iter().zip(&spreads))
@@ -271,26 +271,31 @@ fn find_wholes(
     }
 }
 
-/// Effects of the whole arm anew, each beside the others, in a motion that has the joints' jolts: those measured are smoothed.
-/// Whether any was.
-fn refine_all(
+/// Effects of the whole arm and encoder zeros anew, in a motion that has the joints' jolts, by `laws`: those measured are smoothed.
+/// Leaves the joints in the surroundings of the arm that has them; that arm.
+fn settle(
     model: &Model,
-    moved: &[Motion],
     joints: &mut [Joint],
-    chosen: &[Option<Chosen>],
-    wholes: &mut [Found],
-) -> bool {
-    let mut any = false;
-    for at in 0..wholes.len() {
-        let others: Vec<Found> =
-            wholes.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, own)| own.clone()).collect();
-        let Some(base) = with(model, &others) else { continue };
-        let settle = |joints: &mut [Joint], moved: &[Motion]| refine(&base, moved, joints, chosen, &wholes[at]);
-        if let Some(refined) = excerpt::with_arm(joints, moved, settle) {
-            (wholes[at], any) = (refined, true);
+    chosen: &mut [Option<Chosen>],
+    wholes: &mut Vec<Found>,
+    laws: &[Option<Law>],
+    episodes: &[Episode],
+) -> Option<Model> {
+    let mut real = with(model, wholes)?;
+    let mut moved = motions(&real, joints, laws, episodes);
+    let refined = excerpt::with_arm(joints, &moved, |joints, moved| refine(model, moved, joints, chosen, wholes));
+    if let Some(refined) = refined {
+        let zero_of = |j: usize| refined.iter().find(|own| own.whole == Whole::Offset(j)).map(|own| own.values[0]);
+        for (j, own) in chosen.iter_mut().enumerate() {
+            let Some(own) = own else { continue };
+            own.put_zero_off(zero_of(j));
+            moved.iter_mut().for_each(|motion| motion.put_zero_off(j, own.fit.law[Param::Offset]));
         }
+        *wholes = refined.into_iter().filter(|own| !matches!(own.whole, Whole::Offset(_))).collect();
+        real = with(model, wholes)?;
     }
-    any
+    surround(joints, &real, &moved);
+    Some(real)
 }
 
 /// The model with effects of the whole arm; `None` where they are no body's.

@@ -7,7 +7,7 @@ use crate::choose::Chosen;
 use crate::fit::{fit, normal};
 use crate::follow::follow;
 use crate::given::Given;
-use crate::interval::{Spread, T975};
+use crate::interval::{REACH, Spread};
 use crate::kinds::Kind;
 use crate::law::{Law, Param};
 use crate::model::ServoModel;
@@ -81,7 +81,7 @@ fn worst(found: &[Found]) -> Option<Worst> {
         let (chosen, spread) = (found.chosen?, found.spread?);
         let part = |param: &Param| {
             let value = chosen.fit.law[*param].abs();
-            let half = T975 * spread.deviation(*param)?;
+            let half = REACH * spread.deviation(*param)?;
             // A time or an angle of next to nothing is known well, however wide its interval beside it.
             let least = if NEAR_ZERO.contains(param) { found.joint.ranges.scale[*param as usize] } else { 0.0 };
             let told = value.is_finite() && value > least && half.is_finite() && name(chosen, *param).is_some();
@@ -111,7 +111,7 @@ pub fn next_experiment(model: &Model, corrected: &ServoModel, found: &[Found]) -
         .collect();
     // The first of equals: the order of the library does not depend on the number of threads.
     let (variance, i, motion) = tried.into_iter().reduce(|best, other| if other.0 < best.0 { other } else { best })?;
-    let there = T975 * variance.sqrt() / chosen.fit.law[worst.param].abs();
+    let there = REACH * variance.sqrt() / chosen.fit.law[worst.param].abs();
     if there * WORTH > worst.part {
         return None;
     }

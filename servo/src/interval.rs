@@ -13,8 +13,10 @@ use nalgebra::DMatrix;
 
 /// Blocks into which all errors of a joint are cut.
 const BLOCKS: usize = 24;
-/// Student's t at 97.5 % with as many blocks less one.
-pub const T975: f64 = 2.07;
+/// Half a 95 % interval over the standard deviation that blocks show: Student's t at 97.5 % with as many blocks less one, times
+/// what they do not show, as other joints' laws are taken as known. Of 66 numbers of 24 simulated arms whose kinds are right,
+/// .95 lie within it, and .76 without the second factor.
+pub const REACH: f64 = 2.07 * 1.6;
 /// A scale known to a third or worse is not known: ratios are given instead of torques.
 const KNOWN: f64 = 0.33;
 
@@ -122,7 +124,7 @@ impl Spread {
 
     /// A parameter as it stands in the law.
     pub fn plain(&self, param: Param, value: f64) -> Interval {
-        around(value, T975 * self.deviation_of(&[(param, 1.0)]))
+        around(value, REACH * self.deviation_of(&[(param, 1.0)]))
     }
 
     /// 1/σ: torque per unit of what the drive follows.
@@ -130,7 +132,7 @@ impl Spread {
         let Some(i) = self.at(Param::Scale) else {
             return Interval { value: 1.0 / sigma, ci95: [Some(1.0 / sigma); 2] };
         };
-        let half = T975 * self.covariance[(i, i)].max(0.0).sqrt();
+        let half = REACH * self.covariance[(i, i)].max(0.0).sqrt();
         let most = (sigma > half).then(|| 1.0 / (sigma - half));
         Interval { value: 1.0 / sigma, ci95: [Some(1.0 / (sigma + half)), most] }
     }
@@ -140,10 +142,10 @@ impl Spread {
         let (sum, sigma): (f64, f64) = (params.iter().map(|param| law[*param]).sum(), law[Param::Scale]);
         if !self.scale_is_known() {
             let parts: Vec<(Param, f64)> = params.iter().map(|param| (*param, 1.0)).collect();
-            return around(sum, T975 * self.deviation_of(&parts));
+            return around(sum, REACH * self.deviation_of(&parts));
         }
         let parts = params.iter().map(|param| (*param, 1.0 / sigma)).chain([(Param::Scale, -sum / (sigma * sigma))]);
-        around(sum / sigma, T975 * self.deviation_of(&parts.collect::<Vec<_>>()))
+        around(sum / sigma, REACH * self.deviation_of(&parts.collect::<Vec<_>>()))
     }
 }
 

@@ -217,6 +217,12 @@ impl Kind {
         matches!(self, Kind::Saturation | Kind::SpeedLimit | Kind::Feedforward)
     }
 
+    /// Whether one joint feels like this what a body at the flange or a tilted base does to it: by gravity a torque, a turn or
+    /// another gain, by inertia a rotor, and a damping that makes up for what is wrong of these.
+    pub fn looks_like_load(self) -> bool {
+        matches!(self, Kind::Bias | Kind::Offset | Kind::GainError | Kind::Armature | Kind::DampingError)
+    }
+
     /// Whether motor and link turn apart by it.
     pub fn turns_apart(self) -> bool {
         matches!(self, Kind::Elasticity | Kind::Backlash)

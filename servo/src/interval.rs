@@ -152,3 +152,40 @@ impl Spread {
 fn around(value: f64, half: f64) -> Interval {
     Interval { value, ci95: [Some(value - half), Some(value + half)] }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two parameters that are known to .1 and .2, one less than the other by as much.
+    fn spread() -> Spread {
+        Spread {
+            free: vec![Param::Coulomb, Param::Rise],
+            values: vec![1.0, 2.0],
+            covariance: DMatrix::from_row_slice(2, 2, &[0.01, -0.02, -0.02, 0.04]),
+        }
+    }
+
+    #[test]
+    fn an_interval_of_a_sum_knows_that_its_parts_go_together() {
+        let mut law = Law::default();
+        (law[Param::Scale], law[Param::Coulomb], law[Param::Rise]) = (1.0, 1.0, 2.0);
+        let half = |params: &[Param]| {
+            let Interval { value, ci95: [low, _] } = spread().torque(params, &law);
+            value - low.unwrap()
+        };
+        assert!((half(&[Param::Rise]) - 0.2 * REACH).abs() < 1e-12);
+        // .04 + .01 - 2 x .02 is .01.
+        assert!((half(&[Param::Coulomb, Param::Rise]) - 0.1 * REACH).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_finer_steps_change_stands_in_the_interval() {
+        let mut coarse = Law::default();
+        (coarse[Param::Coulomb], coarse[Param::Rise]) = (1.9, 2.0);
+        // Of .9 by steps four times as long, a third is left at most.
+        let deviation = spread().with_steps_from(&coarse, 4.0).deviation(Param::Coulomb).unwrap();
+        assert!((deviation - (0.01_f64 + 0.09).sqrt()).abs() < 1e-12, "{deviation}");
+        assert_eq!(spread().with_steps_from(&coarse, 4.0).deviation(Param::Rise), spread().deviation(Param::Rise));
+    }
+}

@@ -19,11 +19,11 @@ const TICK: f64 = std::f64::consts::TAU / 4096.0;
 
 /// Logs of the arm at 100 Hz with these stiffnesses, N m/rad, a damping of 60 ms of them, and more by `effects`.
 fn logs(model: &Model, stiffness: [f64; 2], effects: impl Fn(&mut Law)) -> Vec<Episode> {
-    of_each(model, stiffness, |_, law| effects(law))
+    of_each(model, &stiffness, |_, law| effects(law))
 }
 
 /// The same, joint by joint.
-fn of_each(model: &Model, stiffness: [f64; 2], effects: impl Fn(usize, &mut Law)) -> Vec<Episode> {
+fn of_each(model: &Model, stiffness: &[f64], effects: impl Fn(usize, &mut Law)) -> Vec<Episode> {
     let laws: Vec<Option<Law>> = stiffness
         .iter()
         .enumerate()
@@ -43,10 +43,11 @@ fn of_each(model: &Model, stiffness: [f64; 2], effects: impl Fn(usize, &mut Law)
                 let step = if (t * 0.4 + 0.3 * j as f64).fract() > 0.5 { 0.25 } else { -0.15 };
                 0.5 * a.sin() + 0.15 * b.sin() + if t > 1.0 { step } else { 0.0 }
             };
-            let command: Vec<Vec<f64>> = (0..2).map(|j| time.iter().map(|&t| told(j, t)).collect()).collect();
+            let row = |j: usize| time.iter().map(|&t| told(j, t)).collect();
+            let command: Vec<Vec<f64>> = (0..model.dof()).map(row).collect();
             let start = Episode {
                 name: format!("run_{run}.csv"),
-                joints: vec!["a".into(), "b".into()],
+                joints: model.joints().iter().map(|joint| joint.name.clone()).collect(),
                 position: command.iter().map(|u| vec![u[0]; time.len()]).collect(),
                 command: Some(command),
                 time,
@@ -167,7 +168,7 @@ fn of(diagnosis: &gapscope_servo::schema::Diagnosis, kind: &str, name: &str, joi
 #[test]
 fn a_speed_limit_and_a_dead_band_are_claimed_against_given_ones() {
     let model = model();
-    let logs = of_each(&model, [6.0, 3.0], |j, law| {
+    let logs = of_each(&model, &[6.0, 3.0], |j, law| {
         if j == 0 {
             law[Param::Speed] = 0.9;
         } else {
@@ -185,7 +186,7 @@ fn a_speed_limit_and_a_dead_band_are_claimed_against_given_ones() {
 #[test]
 fn play_is_found_with_its_width() {
     let model = model();
-    let logs = of_each(&model, [6.0, 3.0], |j, law| {
+    let logs = of_each(&model, &[6.0, 3.0], |j, law| {
         if j == 0 {
             law[Param::Gap] = 0.04;
             law[Param::Spring] = 125.0;
@@ -208,7 +209,7 @@ fn play_is_found_with_its_width() {
 #[test]
 fn a_spring_behind_a_motor_is_found_with_its_stiffness() {
     let model = model();
-    let logs = of_each(&model, [6.0, 3.0], |j, law| {
+    let logs = of_each(&model, &[6.0, 3.0], |j, law| {
         if j == 1 {
             law[Param::Spring] = 25.0;
             law[Param::Armature] = 0.001;
@@ -236,6 +237,70 @@ fn a_body_at_the_flange_is_found_against_a_given_servo() {
     // The corrected arm carries it to other logs.
     let (evaluation, _) = evaluate(&model, &logs, &given, Some(&outcome.corrected)).unwrap();
     assert!(evaluation.shrink.unwrap().position.shrink.unwrap() > 0.9);
+}
+
+/// What is found of a real arm under servos that are given as they are.
+fn against_given(model: &Model, real: &Model, effects: impl Fn(usize, &mut Law)) -> gapscope_servo::Outcome {
+    let text = "[joint.a]\nstiffness = 6\ndamping = 0.36\n[joint.b]\nstiffness = 3\ndamping = 0.18\n";
+    let given = Given::from_toml(text, &["a".to_owned(), "b".to_owned()]).unwrap();
+    diagnose(model, &of_each(real, &[6.0, 3.0], effects), &given, Vec::new(), &|_, _| {}).unwrap()
+}
+
+#[test]
+fn what_a_body_turns_about_itself_is_no_rotor() {
+    let model = model();
+    // A ball of 6 cm.
+    let own = 0.4 * 0.1 * 0.06 * 0.06;
+    let inertia = [own, 0.0, own, 0.0, 0.0, own];
+    let body = Effect::Payload(Payload { joint: "b".into(), mass: 0.1, com: [0.01, 0.0, 0.05], inertia });
+    let loaded = Plant::new(&model, std::slice::from_ref(&body), 1e-3).unwrap().model().clone();
+    let diagnosis = against_given(&model, &loaded, |_, _| {}).diagnosis;
+    let kinds: Vec<&str> = diagnosis.effects.iter().map(|effect| effect.kind.as_str()).collect();
+    assert_eq!(kinds, ["payload"]);
+    let Some(Parameter::Single(mass)) = diagnosis.effects[0].parameters.get("mass") else { panic!("a mass") };
+    assert!((mass.value / 0.1 - 1.0).abs() < 0.1, "{mass:?}");
+}
+
+#[test]
+fn an_encoder_zero_that_is_off_is_told_of_its_joint_alone() {
+    // All links behind the joint hang elsewhere, so that the joint behind it feels an offset too.
+    let hand = r#"<link name="hand"><inertial><origin xyz="0 0 0.04"/><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="c" type="revolute"><parent link="lower"/><child link="hand"/><origin xyz="0 0 0.1"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="5" velocity="9"/></joint>
+</robot>"#;
+    let model = Model::from_urdf(&ARM.replace("</robot>", hand)).unwrap().model;
+    let logs = of_each(&model, &[9.0, 5.0, 3.0], |j, law| {
+        if j == 1 {
+            law[Param::Offset] = -0.08;
+        }
+    });
+    let diagnosis = diagnose(&model, &logs, &Given::default(), Vec::new(), &|_, _| {}).unwrap().diagnosis;
+    let told: Vec<(&str, &[String])> = diagnosis.effects.iter().map(|e| (e.kind.as_str(), &e.joints[..])).collect();
+    assert_eq!(told, [("joint_zero_offset", &["b".to_owned()][..])]);
+    let found = of(&diagnosis, "joint_zero_offset", "offset", "b");
+    assert!((found + 0.08).abs() < 0.004, "{found}");
+}
+
+#[test]
+fn friction_that_rises_towards_rest_is_told_to_a_few_per_cent() {
+    // Steps as long as a search may take made its speed wrong by half, and friction at speed by a tenth.
+    let model = model();
+    let outcome = against_given(&model, &model, |j, law| {
+        if j == 1 {
+            law[Param::Coulomb] = 0.012;
+            law[Param::Rise] = 0.012;
+            law[Param::StribeckVelocity] = 0.15;
+        }
+    });
+    let sigma = 1.0 / 3.0;
+    for (name, truth) in [("coulomb", 0.012 / sigma), ("static", 0.024 / sigma), ("stribeck_velocity", 0.15)] {
+        let effect =
+            outcome.diagnosis.effects.iter().find(|effect| effect.kind == "stribeck_friction").expect("friction");
+        let found = effect.parameters[name].at("b").unwrap();
+        let [Some(low), Some(high)] = found.ci95 else { panic!("{name} has no interval") };
+        assert!((found.value / truth - 1.0).abs() < 0.06, "{name} {found:?} for {truth}");
+        assert!(low <= truth && truth <= high, "{name} {found:?} for {truth}");
+    }
+    assert_eq!(outcome.diagnosis.verdict, "explained");
 }
 
 #[test]

@@ -1,0 +1,259 @@
+//! The search for effects of the whole arm: what they are worth beside what its joints were found to have, and in its place.
+
+use crate::around::Motion;
+use crate::choice::TAKEN;
+use crate::choose::{Chosen, restore};
+use crate::fit::Fit;
+use crate::kinds::Kind;
+use crate::law::Param;
+use crate::prepare::Joint;
+use crate::settle::{Account, LOCAL, STEPS, Search, Settled, fit_all, misfit, worth};
+use crate::weigh::{independent, least, tracking};
+use crate::whole::{Found, Whole, around, put};
+use gapscope_dynamics::Model;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A rival ties if the error with it is at most this much more.
+const TIE: f64 = 0.02;
+
+/// What looking for effects of the whole arm gives.
+pub struct Outcome {
+    /// The likeliest one that the logs speak for.
+    pub found: Option<Found>,
+    /// Effects of the whole arm that could stand in the place of biases and offsets.
+    pub ties: Vec<Whole>,
+}
+
+/// Looks for an effect of the whole arm beside, or in the place of, what its joints were found to have. Leaves the joints in
+/// the surroundings of the model that it is given.
+pub fn look(
+    model: &Model,
+    motions: &[Motion],
+    joints: &mut [Joint],
+    chosen: &[Option<Chosen>],
+    without: &[Whole],
+) -> Outcome {
+    let beside = accounts(chosen);
+    let instead = without_load(chosen, joints);
+    // Behind a zero that is off all links hang elsewhere.
+    let mut turned = motions.to_vec();
+    for (j, own) in beside.iter().enumerate() {
+        let offset = own.as_ref().map_or(0.0, |own| own.law[Param::Offset]);
+        turned.iter_mut().for_each(|motion| motion.put_zero_off(j, offset));
+    }
+    let plain = around(model, &turned);
+    let count = |account: &Option<Account>| account.as_ref().map_or(0, |a| a.free.len());
+    let fewer = |j: usize, than: &[Option<Account>]| count(&beside[j]) as f64 - count(&than[j]) as f64;
+    put(joints, &plain);
+    let perfect: Vec<f64> = joints.iter().map(tracking).collect();
+    // What more rounds of the same account take away speaks for no effect.
+    let fits = fit_all(joints, &beside, STEPS * LOCAL);
+    let mut outcome = Outcome { found: None, ties: Vec::new() };
+    for whole in Whole::ALL.into_iter().filter(|whole| !without.contains(whole)) {
+        let Some(search) = Search::new(&[whole], model, &turned, &fits, true) else { continue };
+        let none = vec![0.0; whole.numbers()];
+        put(joints, &plain);
+        let price = whole.price(worth(joints, &fits).iter().sum());
+        let mut tried: Vec<(f64, Settled, f64)> = Vec::new();
+        let mut hold = |joints: &[Joint], settled: Settled, accounts: &[Option<Account>]| {
+            let of = |j: usize| {
+                Some(0.5 * fewer(j, accounts) * independent(&joints[j], &settled.fits[j].as_ref()?.errors).ln())
+            };
+            let saved: f64 = (0..joints.len()).filter_map(of).sum();
+            tried.push((nats(joints, &fits, &settled.fits) - price + saved, settled, saved));
+        };
+        if search.promise(joints, &fits) > 0.5 * price
+            && let Some(settled) = search.settle(joints, &beside, &none)
+        {
+            hold(joints, settled, &beside);
+        }
+        // What it called up at the joints may be all that they have of the kind; what is missed beside it comes back.
+        let calls_up = (0..joints.len()).any(|j| fewer(j, &instead) > 0.0);
+        let is_turned = calls_up && turned != motions;
+        let upright = is_turned.then(|| Search::new(&[whole], model, motions, &fits, true)).flatten();
+        let upright = upright.as_ref().unwrap_or(&search);
+        if calls_up
+            && let Some(alone) = upright.settle(joints, &instead, &none)
+            && let Some(base) = upright.around(&alone.values)
+        {
+            put(joints, &base);
+            let accounts = restored(joints, chosen, &alone.fits);
+            let settled = upright.settle(joints, &accounts, &alone.values).unwrap_or(alone);
+            let has_constant = |free: &[Param]| free.iter().any(|param| matches!(param, Param::Bias | Param::Offset));
+            let (total, other) = (sum(&fits), sum(&settled.fits));
+            if other.sqrt() <= (1.0 + TIE) * total.sqrt()
+                && !accounts.iter().flatten().any(|own| has_constant(&own.free))
+            {
+                outcome.ties.push(whole);
+            }
+            hold(joints, settled, &accounts);
+        }
+        tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let Some((nats, settled, saved)) = tried.into_iter().next() else { continue };
+        let falls = |j: usize| {
+            let (rich, poor) = (settled.fits[j].as_ref()?, fits[j].as_ref()?);
+            Some((poor.cost - rich.cost, least(rich.cost, perfect[j]), poor.cost))
+        };
+        let falls: Vec<(f64, f64, f64)> = (0..joints.len()).filter_map(falls).collect();
+        let share = falls.iter().map(|(fall, _, poor)| fall / poor.max(1e-300)).fold(0.0, f64::max);
+        let relevant = falls.iter().any(|(fall, least, _)| fall > least) || saved > 0.0;
+        // Its numbers must lie off nothing as well: a fit may fall by what they do not do.
+        let nats = nats.min(settled.nats() - price + saved);
+        let possible = search.is_possible(&settled.values);
+        if nats > TAKEN && relevant && possible && outcome.found.as_ref().is_none_or(|found| nats > found.nats) {
+            let (covariance, laws) = (search.covariance(&settled), settled.laws());
+            outcome.found = Some(Found { whole, values: settled.values, covariance, nats, share, laws });
+        }
+    }
+    put(joints, &plain);
+    outcome
+}
+
+/// The numbers of effects that were found, anew and all at once, with the encoder zeros that joints were found to have: beside what
+/// else the joints have, or beside nothing, which their first numbers may have called up. What is not missed beside the others is
+/// left out. Leaves the joints in the surroundings of the model without them.
+pub fn refine(
+    model: &Model,
+    motions: &[Motion],
+    joints: &mut [Joint],
+    chosen: &[Option<Chosen>],
+    found: &[Found],
+) -> Option<Vec<Found>> {
+    let [mut beside, mut alone] = [accounts(chosen), bare(chosen, joints)];
+    let offset = |(j, own): (usize, &Option<Chosen>)| {
+        let fit =
+            own.as_ref().filter(|own| own.kinds.iter().any(|(kind, _)| *kind == Kind::Offset)).map(|own| &own.fit)?;
+        let (values, covariance) = (vec![fit.law[Param::Offset]], DMatrix::zeros(1, 1));
+        Some(Found { whole: Whole::Offset(j), values, covariance, nats: 0.0, share: 0.0, laws: Vec::new() })
+    };
+    let mut kept: Vec<Found> = found.iter().cloned().chain(chosen.iter().enumerate().filter_map(offset)).collect();
+    // A zero that is not among them is right.
+    let mut motions = motions.to_vec();
+    for own in &kept {
+        let Whole::Offset(joint) = own.whole else { continue };
+        motions.iter_mut().for_each(|motion| motion.put_zero_off(joint, 0.0));
+        for account in [&mut beside, &mut alone].into_iter().filter_map(|accounts| accounts[joint].as_mut()) {
+            account.put_zero_off(0.0);
+        }
+    }
+    loop {
+        if kept.is_empty() {
+            return Some(kept);
+        }
+        let wholes: Vec<Whole> = kept.iter().map(|own| own.whole).collect();
+        let values: Vec<f64> = kept.iter().flat_map(|own| own.values.iter().copied()).collect();
+        let search = Search::new(&wholes, model, &motions, &vec![None; joints.len()], false)?;
+        let mut settle = |accounts: &[Option<Account>]| {
+            search.settle(joints, accounts, &values).filter(|settled| search.is_possible(&settled.values))
+        };
+        let settled: Vec<Settled> = [&beside, &alone].into_iter().filter_map(|accounts| settle(accounts)).collect();
+        put(joints, &search.plain);
+        let samples = settled.first().map(|settled| worth(joints, &settled.fits))?;
+        let price = |fits: &[Option<Fit>]| -> f64 {
+            let of = |(fit, samples): (&Option<Fit>, &f64)| {
+                fit.as_ref().map_or(0.0, |fit| 0.5 * fit.free.len() as f64 * samples.max(2.0).ln())
+            };
+            fits.iter().zip(&samples).map(of).sum()
+        };
+        let score = |settled: &Settled| misfit(&settled.fits, &samples) + price(&settled.fits);
+        let settled = settled.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
+        let (covariance, laws) = (search.covariance(&settled), settled.laws());
+        let places = search.places();
+        let needless = needless(&places, &settled, &covariance, samples.iter().sum());
+        for (own, (_, numbers)) in kept.iter_mut().zip(&places) {
+            own.values = settled.values[numbers.clone()].to_vec();
+            own.covariance = covariance.view((numbers.start, numbers.start), (numbers.len(), numbers.len())).into();
+            own.laws.clone_from(&laws);
+        }
+        if needless.is_empty() {
+            return Some(kept);
+        }
+        kept.retain(|own| !needless.contains(&own.whole));
+    }
+}
+
+/// Effects that the logs do not miss: the weakest beside the others, then the weakest beside those that are left, while what is lost
+/// in all is less than their price.
+fn needless(
+    places: &[(Whole, Range<usize>)],
+    settled: &Settled,
+    covariance: &DMatrix<f64>,
+    samples: f64,
+) -> Vec<Whole> {
+    let (mut out, mut numbers, mut price) = (Vec::new(), Vec::new(), 0.0);
+    loop {
+        let more = |(whole, own): &(Whole, Range<usize>)| {
+            let with: Vec<usize> = numbers.iter().copied().chain(own.clone()).collect();
+            let price = price + whole.price(samples) + TAKEN;
+            (settled.loss(covariance, &with) - price, *whole, with, price)
+        };
+        let left = places.iter().filter(|(whole, _)| !out.contains(whole));
+        let Some(weakest) = left.map(more).min_by(|a, b| a.0.total_cmp(&b.0)) else { return out };
+        if weakest.0 > 0.0 {
+            return out;
+        }
+        out.push(weakest.1);
+        (numbers, price) = (weakest.2, weakest.3);
+    }
+}
+
+/// The same without what a body or a tilted base looks like to one joint.
+fn without_load(chosen: &[Option<Chosen>], joints: &[Joint]) -> Vec<Option<Account>> {
+    without(chosen, joints, is_called_up)
+}
+
+/// Accounts of the joints without any kind.
+fn bare(chosen: &[Option<Chosen>], joints: &[Joint]) -> Vec<Option<Account>> {
+    without(chosen, joints, |_| true)
+}
+
+/// Whether an effect of the whole arm calls a kind up at a joint: what looks like load, and springs, which take over what is jolted.
+fn is_called_up(kind: Kind) -> bool {
+    kind.looks_like_load() || kind.turns_apart()
+}
+
+fn without(chosen: &[Option<Chosen>], joints: &[Joint], goes: impl Fn(Kind) -> bool) -> Vec<Option<Account>> {
+    let one = |(own, joint): (&Option<Chosen>, &Joint)| {
+        let own = own.as_ref()?;
+        let mut account = Account { law: own.fit.law, free: own.fit.free.clone() };
+        let stay: Vec<Kind> = own.kinds.iter().map(|own| own.0).filter(|kind| !goes(*kind)).collect();
+        for kind in own.kinds.iter().map(|own| own.0).filter(|kind| goes(*kind)) {
+            kind.clear(&mut account.law, &joint.start, &stay);
+            let stays = |param: &Param| stay.iter().any(|kind| kind.parameters().iter().any(|own| own.0 == *param));
+            account.free.retain(|param| stays(param) || !kind.parameters().iter().any(|(own, _, _)| own == param));
+        }
+        Some(account)
+    };
+    chosen.iter().zip(joints).map(one).collect()
+}
+
+/// Accounts of the joints as they are surrounded now, from fits without what looks like load on: with what is missed of it.
+fn restored(joints: &mut [Joint], chosen: &[Option<Chosen>], fits: &[Option<Fit>]) -> Vec<Option<Account>> {
+    let one = |((joint, own), fit): ((&mut Joint, &Option<Chosen>), &Option<Fit>)| {
+        let (own, fit) = (own.as_ref()?, fit.as_ref()?);
+        let (among, kept) = own.kinds.iter().map(|own| own.0).partition(|kind: &Kind| is_called_up(*kind));
+        let Fit { law, free, .. } = restore(joint, &fit.law, kept, among);
+        Some(Account { law, free })
+    };
+    joints.par_iter_mut().zip(chosen).zip(fits).map(one).collect()
+}
+
+fn accounts(chosen: &[Option<Chosen>]) -> Vec<Option<Account>> {
+    let of = |own: &Chosen| Account { law: own.fit.law, free: own.fit.free.clone() };
+    chosen.iter().map(|own| own.as_ref().map(of)).collect()
+}
+
+/// Nats by which richer fits are ahead of poorer ones, before what they cost.
+fn nats(joints: &[Joint], poor: &[Option<Fit>], rich: &[Option<Fit>]) -> f64 {
+    let one = |((joint, poor), rich): ((&Joint, &Option<Fit>), &Option<Fit>)| match (poor, rich) {
+        (Some(poor), Some(rich)) => 0.5 * independent(joint, &rich.errors) * (poor.cost / rich.cost.max(1e-300)).ln(),
+        _ => 0.0,
+    };
+    joints.iter().zip(poor).zip(rich).map(one).sum()
+}
+
+fn sum(fits: &[Option<Fit>]) -> f64 {
+    fits.iter().flatten().map(|fit| fit.cost).sum()
+}

@@ -292,8 +292,10 @@ fn settle(
             own.put_zero_off(zero_of(j));
             moved.iter_mut().for_each(|motion| motion.put_zero_off(j, own.fit.law[Param::Offset]));
         }
-        *wholes = refined.into_iter().filter(|own| !matches!(own.whole, Whole::Offset(_))).collect();
-        real = with(model, wholes)?;
+        let kept: Vec<Found> = refined.into_iter().filter(|own| !matches!(own.whole, Whole::Offset(_))).collect();
+        if let Some(there) = with(model, &kept) {
+            (*wholes, real) = (kept, there);
+        }
     }
     surround(joints, &real, &moved);
     Some(real)

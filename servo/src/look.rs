@@ -159,13 +159,12 @@ pub fn refine(
         };
         let score = |settled: &Settled| misfit(&settled.fits, &samples) + price(&settled.fits);
         let settled = settled.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
-        let (covariance, laws) = (search.covariance(&settled), settled.laws());
+        let covariance = search.covariance(&settled);
         let places = search.places();
         let needless = needless(&places, &settled, &covariance, samples.iter().sum());
         for (own, (_, numbers)) in kept.iter_mut().zip(&places) {
             own.values = settled.values[numbers.clone()].to_vec();
             own.covariance = covariance.view((numbers.start, numbers.start), (numbers.len(), numbers.len())).into();
-            own.laws.clone_from(&laws);
         }
         if needless.is_empty() {
             return Some(kept);
@@ -199,14 +198,14 @@ fn needless(
     }
 }
 
-/// The same without what a body or a tilted base looks like to one joint.
-fn without_load(chosen: &[Option<Chosen>], joints: &[Joint]) -> Vec<Option<Account>> {
-    without(chosen, joints, is_called_up)
-}
-
 /// Accounts of the joints without any kind.
 fn bare(chosen: &[Option<Chosen>], joints: &[Joint]) -> Vec<Option<Account>> {
     without(chosen, joints, |_| true)
+}
+
+/// Accounts of the joints without what a body or a tilted base looks like to one joint.
+fn without_load(chosen: &[Option<Chosen>], joints: &[Joint]) -> Vec<Option<Account>> {
+    without(chosen, joints, is_called_up)
 }
 
 /// Whether an effect of the whole arm calls a kind up at a joint: what looks like load, and springs, which take over what is jolted.
@@ -214,6 +213,7 @@ fn is_called_up(kind: Kind) -> bool {
     kind.looks_like_load() || kind.turns_apart()
 }
 
+/// Accounts of the joints without the kinds that go.
 fn without(chosen: &[Option<Chosen>], joints: &[Joint], goes: impl Fn(Kind) -> bool) -> Vec<Option<Account>> {
     let one = |(own, joint): (&Option<Chosen>, &Joint)| {
         let own = own.as_ref()?;

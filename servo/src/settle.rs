@@ -25,6 +25,8 @@ pub(crate) const LOCAL: usize = 2;
 /// that leads up.
 const DAMPING: f64 = 0.01;
 const MORE: f64 = 30.0;
+/// Nats that a step must gain: less is told by no log.
+const GAIN: f64 = 0.5;
 
 /// A joint's account: its law and what of it is free.
 #[derive(Clone)]
@@ -310,7 +312,7 @@ impl<'a> Search<'a> {
             }
             self.tell(&mut accounts, &values);
             let fits = fit_all(joints, &accounts, LOCAL);
-            if self.misfit(&fits, &samples) > self.misfit(&best.fits, &samples) - 0.5 {
+            if self.misfit(&fits, &samples) > self.misfit(&best.fits, &samples) - GAIN {
                 damping *= MORE;
                 refused += 1;
                 continue;

@@ -50,7 +50,7 @@ pub struct Found {
     pub nats: f64,
     /// Share of the squared error that it takes away where it takes most.
     pub share: f64,
-    /// The joints' laws beside it.
+    /// The joints' laws beside it, as it was found first.
     pub laws: Vec<Option<Law>>,
 }
 
@@ -91,7 +91,7 @@ impl Whole {
             Whole::Tilt => vec![PROBE.0; 2],
             Whole::Payload => {
                 let moment = LEVER * mass;
-                vec![mass, 0.5 * moment, 0.5 * moment, 0.5 * moment, mass * RADIUS * RADIUS]
+                vec![mass, 0.5 * moment, 0.5 * moment, 0.5 * moment, ball(mass)]
             }
             Whole::Offset(_) => vec![PROBE.0],
         }

@@ -23,6 +23,10 @@ const NEXT_TO_NOTHING: (f64, f64) = (1e-6, 1e-9);
 /// at up to .02 s · acceleration before friction takes its full size; these at a step's.
 const STOP: (f64, f64) = (1.0, 0.99);
 
+/// Impedance of the contact of a play, next to MuJoCo's least, .0001: the less, the nearer the constraint is to a spring. One
+/// part in 1/SOFT of the torque that would stop the two sides at once comes on top.
+const SOFT: f64 = 1e-3;
+
 /// The model as MJCF, for MuJoCo 4.0.
 pub fn write(nominal: &Model, totals: &Totals, effects: &[Effect]) -> String {
     let step = timestep(nominal, totals, effects);
@@ -205,10 +209,13 @@ impl Writer<'_> {
             let joint = self.model.joints()[drive.joint].name.clone();
             self.xml.start_element("fixed");
             self.set("name", &format!("{joint}_wind_up"));
-            self.set("springlength", &numbers(&[-0.5 * drive.gap, 0.5 * drive.gap]));
-            self.set("stiffness", &number(drive.stiffness));
-            // A tendon's damping acts within the play, too, where there is no contact. Without it a motor would rattle for ever.
-            self.set_number("damping", drive.damping, 0.0);
+            if drive.gap > 0.0 {
+                self.play(drive);
+            } else {
+                self.set("springlength", "0 0");
+                self.set("stiffness", &number(drive.stiffness));
+                self.set_number("damping", drive.damping, 0.0);
+            }
             self.part(&motor_joint(&joint), 1.0);
             self.part(&joint, -1.0);
             self.xml.end_element();
@@ -228,6 +235,19 @@ impl Writer<'_> {
             self.xml.end_element();
         }
         self.xml.end_element();
+    }
+
+    /// Play as a tendon between limits: as our contact, a limit presses and never pulls, and nothing acts between the two. A
+    /// constraint of impedance d passes on d/((1 − d) A) · (stiffness · depth + damping · rate) where A, 1/kg m², is how easily
+    /// the tendon gives way in the zero pose (MuJoCo's documentation, "Computation: constraint model").
+    fn play(&mut self, drive: &Transmission) {
+        let gives_way = 1.0 / drive.rotor + self.totals.mobility[drive.joint];
+        self.set("limited", "true");
+        self.set("range", &numbers(&[-0.5 * drive.gap, 0.5 * drive.gap]));
+        // MuJoCo divides what stands here by the impedance.
+        let of_constraint = |of_force: f64| -of_force * gives_way * (1.0 - SOFT);
+        self.set("solreflimit", &numbers(&[of_constraint(drive.stiffness), of_constraint(drive.damping)]));
+        self.set("solimplimit", &numbers(&[SOFT, SOFT, 1.0]));
     }
 
     fn part(&mut self, joint: &str, coefficient: f64) {

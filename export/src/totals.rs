@@ -2,7 +2,7 @@
 
 use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{Effect, EffectError, JointCoupling, Plant, Transmission};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Sums over effects, one number a joint in the model's order, on top of what the nominal robot has.
 #[derive(Debug, Clone)]
@@ -35,6 +35,9 @@ pub struct Totals {
     pub couplings: Vec<JointCoupling>,
     /// What stands between motors and links.
     pub transmissions: Vec<Transmission>,
+    /// What each joint moves by for a torque at its link with all other joints free, in the zero pose, 1/(kg m²) (1/kg): the
+    /// diagonal of M⁻¹, without the rotors that turn on their own.
+    pub mobility: Vec<f64>,
     /// Inertia about each joint in the middle of the range, rotor included, kg m² (kg).
     pub inertia: Vec<f64>,
 }
@@ -64,6 +67,7 @@ impl Totals {
             lag: 0.0,
             couplings: Vec::new(),
             transmissions: plant.transmissions(),
+            mobility: vec![0.0; n],
             inertia: vec![0.0; n],
         };
         for effect in effects {
@@ -81,12 +85,33 @@ impl Totals {
         for transmission in &t.transmissions {
             t.armature[transmission.joint] -= transmission.rotor;
         }
-        let mut mass = DMatrix::zeros(n, n);
-        t.model.mass_matrix(&mut Data::new(&t.model), &middle(nominal), &mut mass);
-        for j in 0..n {
-            t.inertia[j] = mass[(j, j)] + t.armature[j] - nominal.armature()[j];
+        let mass = t.mass(&middle(nominal));
+        t.inertia = mass.diagonal().iter().copied().collect();
+        let mut mass = t.mass(&vec![0.0; n]);
+        for coupling in &t.couplings {
+            let mut turns = DVector::zeros(n);
+            for (joint, by) in coupling.joints.iter().zip([1.0, coupling.ratio]) {
+                if let Some(j) = nominal.joint_index(joint) {
+                    turns[j] = by;
+                }
+            }
+            mass.ger(coupling.armature, &turns, &turns, 1.0);
+        }
+        if let Some(inverse) = mass.try_inverse() {
+            t.mobility = inverse.diagonal().iter().copied().collect();
         }
         Ok(t)
+    }
+
+    /// Mass matrix of the links and of what turns with them, kg m² (kg).
+    fn mass(&self, q: &[f64]) -> DMatrix<f64> {
+        let n = self.model.dof();
+        let mut mass = DMatrix::zeros(n, n);
+        self.model.mass_matrix(&mut Data::new(&self.model), q, &mut mass);
+        for j in 0..n {
+            mass[(j, j)] += self.armature[j] - self.model.armature()[j];
+        }
+        mass
     }
 
     fn add(&mut self, effect: &Effect) {

@@ -1,5 +1,6 @@
 """From a diagnosis into MuJoCo itself."""
 
+import importlib
 import importlib.util
 import runpy
 import shutil
@@ -132,3 +133,14 @@ def test_samples_of_the_region_are_robots(command, tmp_path):
     found = {p["joint"]: p for p in ranges.parameters if p["parameter"] == "coulomb"}
     for of_joint, joint in zip(np.transpose(frictions), ("joint1", "joint2")):
         assert found[joint]["range"][0] < of_joint.min() < of_joint.max() < found[joint]["range"][1]
+
+
+@pytest.mark.parametrize("kind", ["viscous_friction", "backlash"])
+def test_mujoco_closes_the_gap_by_as_much_as_was_predicted(kind, command, tmp_path, monkeypatch):
+    # A small part of the table in docs/export.md.
+    monkeypatch.syspath_prepend(str(ROOT / "tests" / "export"))
+    prove = importlib.import_module("prove")
+    monkeypatch.setattr(prove, "gapscope", lambda _, *words: command(*words))
+    row = prove.prove_kind("", kind, tmp_path)
+    assert row["predicted"] > 0.9
+    assert abs(row["off"]) <= prove.TOLERANCE

@@ -17,7 +17,7 @@ import numpy as np
 HALF_WIDTH, CUTOFF_TIMES_HALF_WIDTH, CUTOFF = 0.010, 0.4631655, 10.0
 # Time for which drives see the first effort before the log begins, s.
 BEFORE = 1.0
-# The same before each free run, s.
+# The same before each free run, and before play is looked at, s.
 LEAD = 1.0
 
 
@@ -58,6 +58,15 @@ def read(log, joints):
     return column("time"), stack("position"), stack("effort")
 
 
+def along(q, v, dt, k, part):
+    """Position and speed of the cubic through samples k and k + 1, `part` of the way from one to the other."""
+    n, s = min(k + 1, len(q) - 1), part
+    slope = (2 * s**3 - 3 * s**2 + 1, s**3 - 2 * s**2 + s, -2 * s**3 + 3 * s**2, s**3 - s**2)
+    rate = (6 * s**2 - 6 * s, 3 * s**2 - 4 * s + 1, -6 * s**2 + 6 * s, 3 * s**2 - 2 * s)
+    at = lambda w: w[0] * q[k] + w[1] * dt * v[k] + w[2] * q[n] + w[3] * dt * v[n]
+    return at(slope), at(rate) / dt
+
+
 class Target:
     """An exported model with its names resolved."""
 
@@ -88,30 +97,37 @@ class Target:
         at_rest = lambda mine: sum(m.actuator_biasprm[i, 4] for i in mine)
         self.hold = m.dof_frictionloss[self.dof] + np.array([at_rest(mine) for mine in self.sticky])
 
-        self.slack = np.array([t >= 0 and np.ptp(m.tendon_lengthspring[t]) > 0 for t in self.tendon])
+        self.slack = np.array([t >= 0 and bool(m.tendon_limited[t]) for t in self.tendon])
         self.couplings = [
             (t, [(m.joint(m.wrap_objid[i]).name, m.wrap_prm[i]) for i in range(adr, adr + num)], m.tendon_frictionloss[t])
             for t, (adr, num) in enumerate(zip(m.tendon_adr, m.tendon_num))
             if m.tendon_frictionloss[t] > 0
         ]
 
-    def passed(self, q, v, effort, dt):
-        """What motors that turn on their own pass on to links that move as logged, in the mean of each sample's hold [T, n]."""
+    def passed(self, q, v, effort, needed, dt):
+        """What motors that turn on their own pass on to links that move as logged, in the mean of each sample's hold [T, n]. They
+        begin where their contact passes on what the links need [n]: one that began in its play would hit and leave it for .5 s."""
         m, d = self.model, mujoco.MjData(self.model)
         parts = max(1, round(dt / m.opt.timestep))
         m.opt.timestep = dt / parts
         turning = [(j, motor, self.tendon[j]) for j, motor in enumerate(self.motor) if motor >= 0]
         out = np.zeros_like(effort)
-        self.set(d, q[0], v[0])
+        begin = np.zeros(len(self.joints))
+        for j, _, tendon in turning:
+            if self.slack[j]:
+                impedance = m.tendon_solimp_lim[tendon, 0]
+                stiffness = -m.tendon_solref_lim[tendon, 0] / (m.tendon_invweight0[tendon] * (1 - impedance))
+                begin[j] = needed[j] / stiffness + math.copysign(m.tendon_range[tendon, 1], needed[j])
+        self.set(d, q[0], v[0], None, [begin, 0 * begin, 0 * begin])
         for k in range(len(effort)):
             d.ctrl[self.control] = effort[k]
             for part in range(parts):
-                d.qpos[self.qpos], d.qvel[self.dof] = q[k] + part / parts * dt * v[k], v[k]
+                d.qpos[self.qpos], d.qvel[self.dof] = along(q, v, dt, k, part / parts)
                 mujoco.mj_step(m, d)
                 for j, motor, tendon in turning:
-                    low, high = m.tendon_lengthspring[tendon]
-                    beyond = d.ten_length[tendon] - np.clip(d.ten_length[tendon], low, high)
-                    out[k, j] += (m.tendon_stiffness[tendon] * beyond + m.tendon_damping[tendon] * d.ten_velocity[tendon]) / parts
+                    spring = m.tendon_stiffness[tendon] * d.ten_length[tendon] + m.tendon_damping[tendon] * d.ten_velocity[tendon]
+                    # A limit's force acts on a motor alone here, as friction of motors stands at their links.
+                    out[k, j] += (spring - d.qfrc_constraint[m.jnt_dofadr[motor]]) / parts
         return out
 
     def set(self, data, q, v, a=None, ahead=None):
@@ -177,7 +193,8 @@ class Target:
 
 
 def gap(xml, log, joints, standstill, times):
-    """Torque gap of a model on a log at the rows of the comparison, [rows, n], N m (N) of effort as logged."""
+    """Torque gap of a model on a log at the rows of the comparison, [rows, n], N m (N) of effort as logged; NaN in the first
+    LEAD s of joints with play."""
     time, position, effort = read(log, joints)
     dt = float(np.median(np.diff(time)))
     kernel, band = Kernel(HALF_WIDTH, dt), Kernel(CUTOFF_TIMES_HALF_WIDTH / CUTOFF, dt)
@@ -211,25 +228,27 @@ def gap(xml, log, joints, standstill, times):
         rest -= np.where(stand, force, 0.0)[:, None] * weights
     if any(motor >= 0 for motor in target.motor) and target.slack.any():
         # Which side of the play a motor is on, inverse dynamics does not say: there it runs under the logged effort.
-        passed = target.passed(pad(q), pad(v), effort, dt)[first : first + length]
+        passed = target.passed(q, v, effort[first : first + length], needed[0], dt)
         rest = np.where(target.slack, passed - needed, rest)
     rest = rest / target.gain
     centers = np.rint((np.asarray(times) - first * dt) / dt).astype(int)
-    return np.stack([band.value @ rest[c - band.reach : c + band.reach + 1] for c in centers])
+    rows = np.stack([band.value @ rest[c - band.reach : c + band.reach + 1] for c in centers])
+    # Where in its play a motor begins, no log says; for a second it hits and leaves its contact.
+    rows[np.ix_(np.asarray(times) < LEAD, target.slack)] = np.nan
+    return rows
 
 
 def wind_up(target, taken, dt):
-    """Wind-up of elastic drives from the torque that links take, k x + d x' = torque: angle, rate, acceleration [T, n]."""
+    """Wind-up of elastic drives from the torque that links take, k x + d x' = torque: angle, rate, acceleration [T, n]; 0 of play."""
     angle = np.zeros_like(taken)
     for j, tendon in enumerate(target.tendon):
-        if tendon < 0:
+        if tendon < 0 or target.slack[j]:
             continue
         k, d = target.model.tendon_stiffness[tendon], target.model.tendon_damping[tendon]
-        gap = target.model.tendon_lengthspring[tendon]
         x = taken[0, j] / k
         for i, torque in enumerate(taken[:, j]):
             x = (torque + d / dt * x) / (k + d / dt)
-            angle[i, j] = x + (gap[1] if torque > 0 else gap[0])
+            angle[i, j] = x
     rate = np.gradient(angle, dt, axis=0)
     return angle, rate, np.gradient(rate, dt, axis=0)
 
@@ -261,6 +280,6 @@ def free_runs(xml, log, joints, horizon, every):
 
 
 def weighted(rows, weights):
-    """sqrt of the mean over joints of (weight * rms)^2."""
-    rms = np.sqrt((rows**2).mean(axis=0))
+    """sqrt of the mean over joints of (weight * rms)^2; what is not a number does not count."""
+    rms = np.sqrt(np.nanmean(rows**2, axis=0))
     return math.sqrt(((weights * rms) ** 2)[weights > 0].mean())

@@ -158,6 +158,7 @@ def page(rows, used, command):
         "table measures the way into the target and not the diagnosis. *Promised* is the shrink of the torque gap that",
         "`evaluate` finds. *Predicted* is that of our own plant with what the target holds, from `ledger.json`. *MuJoCo* is",
         "measured in MuJoCo: its inverse dynamics along the logs, against what its actuators deliver under the logged effort.",
+        f"A joint with play counts from {mujoco_gap.LEAD:g} s on: where in its play a motor begins, no log says.",
         "",
         f"MuJoCo is within {TOLERANCE} of the prediction on {near} of {len(known)} kinds that have one, and loses at most {TOLERANCE} of what",
         f"was promised on {lost} of {len(rows)}. `external_contact` is not carried over.",
@@ -175,8 +176,7 @@ def page(rows, used, command):
     lines += [
         "",
         f"The same models running free: rms error of position over all joints after {HORIZON} s under the logged effort alone, rad.",
-        "MuJoCo's state begins as the log's, after a second in which it was led along the log. Play, whose contact our plant",
-        "does not share with MuJoCo, is held to this alone.",
+        "MuJoCo's state begins as the log's, after a second in which it was led along the log.",
         "",
         "| effect | nominal | corrected, our plant | MuJoCo | of the nominal error removed |",
         "|---|---|---|---|---|",

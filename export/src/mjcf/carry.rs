@@ -1,11 +1,11 @@
 //! What MJCF holds of each effect.
 //!
 //! Source: MuJoCo's XML reference, version 4.0: `body/joint` (damping, frictionloss, armature, stiffness, springref, ref),
-//! `tendon/fixed`, `actuator/general` (delay, dyntype filterexact, gainprm, biasprm, forcerange) and `actuator/dcmotor` with
+//! `tendon/fixed` (stiffness, and limits as soft constraints), `actuator/general` (delay, dyntype filterexact, gainprm, biasprm, forcerange) and `actuator/dcmotor` with
 //! `input="none"`, a passive element that has LuGre friction and cogging. An actuator's delay, filter, gain, bias and force
 //! limit act in this order, which is that of our own drives.
 
-use crate::carry::{Carried, Context, How, loaded, split, warm};
+use crate::carry::{Carried, Context, loaded, split, warm};
 use gapscope_effects::Effect;
 
 /// What becomes of an effect.
@@ -44,11 +44,8 @@ pub fn carry(effect: &Effect, context: &Context) -> Vec<Carried> {
         }
         Effect::Backlash(_) => {
             let [with, without] = split(effect, |joint| context.has_rotor(joint));
-            let note = "a rotor on a hinge of its own, and a fixed tendon slack over the play but for its damping";
-            // Our contact is damped where there is contact only, and never pulls.
-            let near =
-                |part: Effect| Carried { how: How::Approximated, predicted: false, ..Carried::written(&part, note) };
-            let with = with.map(near);
+            let note = "a rotor on a hinge of its own, and a fixed tendon with limits at the play's ends";
+            let with = with.map(|part| Carried::written(&part, note));
             return with.into_iter().chain(without.map(|part| without_rotor(&part))).collect();
         }
         Effect::ExternalContact(_) => Carried::left_out(effect, "belongs to its own log"),

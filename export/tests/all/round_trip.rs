@@ -1,9 +1,10 @@
 //! What is exported, read again by our own readers: the same torque for the same motion, unit by unit and sign by sign.
 
 use gapscope_diagnosis::{Corrected, EncoderSide, MODEL_SCHEMA};
-use gapscope_dynamics::{Loaded, Model, robots};
+use gapscope_dynamics::{Data, Loaded, Model, robots};
 use gapscope_effects::{Effect, Plant};
 use gapscope_export::{Robot, Target, export};
+use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use roxmltree::Document;
@@ -207,6 +208,36 @@ const DRIVES: &str = r#"[
     {"kind": "armature", "armature": {"LAST": 0.25}},
     {"kind": "joint_coupling", "joints": ["FIRST", "LAST"], "coulomb": 0.5, "viscous": 0.25, "armature": 0.125, "ratio": -2.0}
 ]"#;
+
+#[test]
+fn play_is_a_tendon_between_limits_that_press_as_hard_as_our_contact() {
+    let (xml, loaded) = robots().swap_remove(1);
+    let play = r#"[
+        {"kind": "backlash", "gap": {"LAST": 0.02}},
+        {"kind": "joint_elasticity", "stiffness": {"LAST": 900.0}, "damping": {"LAST": 1.5}},
+        {"kind": "armature", "armature": {"LAST": 0.25}}
+    ]"#;
+    let text = exported(Target::Mjcf, &xml, &loaded, effects(play, &loaded.model));
+    let document = Document::parse(&text).unwrap();
+    let tendon = document.descendants().find(|n| n.attribute("name") == Some("joint6_wind_up")).unwrap();
+    let numbers = |name: &str| -> Vec<f64> {
+        tendon.attribute(name).unwrap().split(' ').map(|number| number.parse().unwrap()).collect()
+    };
+    assert_eq!(numbers("range"), [-0.01, 0.01]);
+    assert_eq!(tendon.attribute("stiffness"), None, "nothing acts between the limits");
+    // MuJoCo's constraint of impedance d passes on d/(1 − d) of the acceleration asked for, d² of it divided out, over how
+    // easily the tendon gives way: the rotor and the last link, all other joints free.
+    let model = &loaded.model;
+    let mut mass = DMatrix::zeros(model.dof(), model.dof());
+    model.mass_matrix(&mut Data::new(model), &vec![0.0; model.dof()], &mut mass);
+    let last = model.dof() - 1;
+    let gives_way = 1.0 / 0.25 + mass.try_inverse().unwrap()[(last, last)];
+    let impedance = numbers("solimplimit")[0];
+    for (of_constraint, of_force) in numbers("solreflimit").iter().zip([900.0, 1.5]) {
+        let force = -of_constraint / (gives_way * (1.0 - impedance));
+        assert!((force - of_force).abs() < 1e-6 * of_force, "{force} for {of_force}");
+    }
+}
 
 #[test]
 fn an_mjcf_has_every_number_in_the_unit_and_sign_of_mujoco() {

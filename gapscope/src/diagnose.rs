@@ -156,7 +156,7 @@ impl Found {
                 let report = out.map(|out| out.join("report.html"));
                 summary::summary(&outcome.diagnosis, setting.ledgers.first(), report.as_deref(), paint)
             }
-            Found::Servo(outcome, beside) => servo::summary(&outcome.diagnosis, beside, out, paint),
+            Found::Servo(outcome, beside) => servo::summary(outcome, beside, out, paint),
         }
     }
 

@@ -109,26 +109,24 @@ pub fn summary(diagnosis: &Diagnosis, ledger: Option<&TargetLedger>, out: Option
 
 /// What to change at the joints of the robot's own description; `None` where nothing is a number of one joint.
 fn changes(ledger: &TargetLedger) -> Option<String> {
-    let format = if ledger.target == "mjcf" { "MJCF" } else { "URDF" };
+    let format = if ledger.target == "mjcf" { "in the MJCF" } else { "in the URDF" };
+    let attributes = |text: &str| text.trim_start_matches("<dynamics ").trim_end_matches("/>").to_owned();
+    let lines = ledger.paste.iter().filter_map(|line| line.split_once(": "));
+    to_paste(format, lines.map(|(joint, text)| (joint.to_owned(), attributes(text))).collect())
+}
+
+/// Joints with the attributes that change at each, as XML has them, in a sentence that begins with where; `None` without any.
+pub fn to_paste(place: &str, lines: Vec<(String, String)>) -> Option<String> {
     // Where a number changes, those that are nothing beside it say nothing.
-    let bare = |text: &str| {
-        let attributes = text.trim_start_matches("<dynamics ").trim_end_matches("/>");
+    let bare = |attributes: &str| {
         let all: Vec<String> = attributes.split("\" ").map(|one| one.replace("=\"", " ").replace('"', "")).collect();
         let some: Vec<String> = all.iter().filter(|one| !one.ends_with(" 0")).cloned().collect();
         if some.is_empty() { all.join(", ") } else { some.join(", ") }
     };
-    let mut joints: Vec<String> = ledger
-        .paste
-        .iter()
-        .filter_map(|line| line.split_once(": "))
-        .map(|(joint, text)| format!("{joint} {}", bare(text)).replace(' ', "\u{a0}"))
-        .collect();
-    if joints.len() > CHANGES {
-        let more = joints.len() - CHANGES;
-        joints.truncate(CHANGES);
-        joints.push(format!("and {more} more in the report"));
-    }
-    (!joints.is_empty()).then(|| clean(&format!("in the {format}: {}", joints.join("; "))))
+    let more = lines.len().saturating_sub(CHANGES);
+    let told = lines.iter().take(CHANGES).map(|(joint, text)| format!("{joint} {}", bare(text)).replace(' ', "\u{a0}"));
+    let told: Vec<String> = told.chain((more > 0).then(|| format!("and {more} more in the report"))).collect();
+    (!told.is_empty()).then(|| clean(&format!("{place}: {}", told.join("; "))))
 }
 
 /// What the logs cannot tell apart, a line each.

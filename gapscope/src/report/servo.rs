@@ -20,6 +20,7 @@ use maud::{Markup, html};
 use std::collections::BTreeMap;
 
 pub use answer::{answer, nominal, offset, unit};
+pub use change::{Changes, Line};
 
 /// What is said where no further set points are proposed.
 const NONE_PROPOSED: &str =

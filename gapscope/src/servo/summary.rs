@@ -1,14 +1,15 @@
 //! The diagnosis and the evaluation of a servo arm as a few lines for the terminal, in the order of those of torque.
 
 use crate::report::effort::Effort;
-use crate::report::servo::{answer as three, follows, known, nominal, offset, schema, unit};
+use crate::report::servo::{Changes, Line, answer as three, follows, known, nominal, offset, schema, unit};
 use crate::report::terminal::{INDENT, Paint, block, clean, column, name, pad, wrap};
 use crate::report::{
     Beside, count, in_words, joint_list, parameter, percent, percent_interval, percent_within, plain as rounded,
     sentences as sentences_of, verdict, with_unit,
 };
-use crate::summary::{faults, ordinary_spaces, regime_rows, rest, said, ties, told, which};
+use crate::summary::{faults, ordinary_spaces, regime_rows, rest, said, ties, to_paste, told, which};
 use gapscope_diagnosis::schema::Verdict;
+use gapscope_servo::Outcome;
 use gapscope_servo::schema::{Change, Diagnosis, Estimate, Evaluation, FoundDrive};
 use std::path::Path;
 
@@ -30,8 +31,10 @@ pub fn sentences(diagnosis: &Diagnosis) -> [String; 3] {
     [format!("{} Effects: {which}", headline(diagnosis)), worst, reach(diagnosis)]
 }
 
-/// The diagnosis in some lines: faults, the answer, ties, which, the drives, where, how far, notes, and where the report is.
-pub fn summary(diagnosis: &Diagnosis, beside: &Beside, out: Option<&Path>, paint: &Paint) -> String {
+/// The diagnosis in some lines: faults, the answer, ties, which, the drives, where, how far, notes, what to change in a robot
+/// description, and where the report is.
+pub fn summary(outcome: &Outcome, beside: &Beside, out: Option<&Path>, paint: &Paint) -> String {
+    let diagnosis = &outcome.diagnosis;
     let (data, word) = (&diagnosis.data, schema::verdict(&diagnosis.verdict));
     let mut lines = faults(beside.faults(), beside.doubts(), paint);
     lines.extend(told(&three(diagnosis), word, paint));
@@ -64,6 +67,15 @@ pub fn summary(diagnosis: &Diagnosis, beside: &Beside, out: Option<&Path>, paint
     if let Some(next) = &diagnosis.next_experiment {
         block(&mut lines, paint, "Next", &[effort.say(&clean(&sentences_of(&in_words(&next.motion))))]);
     }
+    let own = Changes::new(diagnosis, &outcome.corrected);
+    let of = |lines: Vec<Line>| lines.into_iter().map(|line| (line.joint, line.attributes)).collect();
+    let changes = [("in the URDF", own.urdf), ("actuators of an MJCF", own.actuators)];
+    block(
+        &mut lines,
+        paint,
+        "Change",
+        &changes.into_iter().filter_map(|(place, own)| to_paste(place, of(own))).collect::<Vec<_>>(),
+    );
     if let Some(out) = out {
         lines.push(format!("{} {}", paint.head(&pad("Report", INDENT - 1)), out.join("report.html").display()));
     }

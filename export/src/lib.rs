@@ -266,6 +266,9 @@ fn notes(target: Target, dt: f64, corrected: &Corrected, totals: &Totals) -> Vec
             joint.link
         ));
     }
+    if target == Target::Urdf && totals.friction.iter().any(|friction| *friction > 0.0) {
+        notes.push("Drake reads no `friction` of a URDF; MuJoCo and PyBullet do".to_owned());
+    }
     if target == Target::Mjcf {
         if totals.model.joints().iter().any(|joint| joint.limits.effort.is_some()) {
             notes.push("commands are held to the effort limits of the robot description, as ctrlrange".to_owned());

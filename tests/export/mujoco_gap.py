@@ -192,9 +192,10 @@ class Target:
         return delivered, sticky, passive
 
 
-def gap(xml, log, joints, standstill, times):
-    """Torque gap of a model on a log at the rows of the comparison, [rows, n], N m (N) of effort as logged; NaN in the first
+def gap(target, log, standstill, times):
+    """Torque gap of a target on a log at the rows of the comparison, [rows, n], N m (N) of effort as logged; NaN in the first
     LEAD s of joints with play."""
+    joints = target.joints
     time, position, effort = read(log, joints)
     dt = float(np.median(np.diff(time)))
     kernel, band = Kernel(HALF_WIDTH, dt), Kernel(CUTOFF_TIMES_HALF_WIDTH / CUTOFF, dt)
@@ -203,7 +204,6 @@ def gap(xml, log, joints, standstill, times):
     whole = {name: filtered(w, position) for name, w in [("q", kernel.value), ("v", kernel.first), ("a", kernel.second)]}
     q, v, a = (whole[name][1 : 1 + length] for name in "qva")
     pad = lambda x: np.concatenate([x[:1].repeat(first, 0), x, x[-1:].repeat(first, 0)])
-    target = Target(xml, joints)
     delivered, sticky, passive = target.forward(pad(q), pad(v), effort, dt)
     delivered = filtered(kernel.held, delivered)[:length]
     sticky, passive = (x[first : first + length] for x in (sticky, passive))

@@ -1,5 +1,6 @@
 //! Which account of the logs is likeliest.
 
+pub mod chance;
 pub mod choose;
 pub mod chosen;
 pub mod climb;

@@ -36,6 +36,11 @@ impl Known {
         Known { columns: candidates.into_par_iter().map(filtered).collect(), ..Known::default() }
     }
 
+    /// The same of logs with the same motion under another effort.
+    pub fn of_other_efforts(&self) -> Known {
+        Known { columns: self.columns.clone(), ..Known::default() }
+    }
+
     /// The columns of a candidate at the rows of the band, where they are known.
     pub fn of(&self, candidate: &Candidate) -> Option<&[Column]> {
         self.columns.iter().find(|(known, _)| known == candidate).map(|(_, columns)| columns.as_slice())

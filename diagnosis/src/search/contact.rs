@@ -52,24 +52,43 @@ pub fn noise(rest: &Rows) -> Rows {
 
 /// Noise of a joint: from the calm rows, as pushes may take up many.
 fn spread(row: &[f64]) -> f64 {
-    let mut size: Vec<f64> = row.iter().map(|r| r.abs()).collect();
-    size.sort_by(f64::total_cmp);
-    size.get(size.len() / 4).copied().unwrap_or(0.0) / QUARTER
+    quarter(&row.iter().map(|r| r.abs()).collect::<Vec<_>>()) / QUARTER
 }
 
-/// The stretches of every episode, s since its start, in which what is left stands out of its noise.
-pub fn stretches(signals: &[Signals], band: &Band, left: &Left, pushes: &Pushes) -> Vec<Vec<[f64; 2]>> {
+/// The first quartile; 0 of nothing.
+fn quarter(x: &[f64]) -> f64 {
+    let mut sorted = x.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 4).copied().unwrap_or(0.0)
+}
+
+/// Beside what the stretches of every episode, s since its start, stand out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Beside {
+    /// Noise.
+    Noise,
+    /// What the calm quarter of all rows leaves, where that is less: of a fit that pushes have bent, all rows leave some of them.
+    Calm,
+}
+
+/// The stretches of every episode, s since its start, in which what is left stands out.
+pub fn stretches(signals: &[Signals], band: &Band, left: &Left, beside: Beside, pushes: &Pushes) -> Vec<Vec<[f64; 2]>> {
     let height: Vec<f64> = (0..band.rows.len())
         .map(|i| {
             let square: f64 = left.told(i).map(|j| (left.rest[j][i] / left.noise[j][i]).powi(2)).sum();
             (square / left.told(i).count().max(1) as f64).sqrt()
         })
         .collect();
-    let outside = height.iter().filter(|h| **h > CLEAR.get()).count();
+    let calm = match beside {
+        Beside::Noise => 1.0,
+        Beside::Calm => quarter(&height).min(1.0),
+    };
+    let stands_out = CLEAR.get() * calm;
+    let outside = height.iter().filter(|h| **h > stands_out).count();
     if outside as f64 > pushes.longest * height.len() as f64 {
         return vec![Vec::new(); signals.len()];
     }
-    above(signals, band, &height, CLEAR.get(), |inside| {
+    above(signals, band, &height, stands_out, |inside| {
         let mut sorted = inside.to_vec();
         sorted.sort_by(f64::total_cmp);
         EDGE * sorted[sorted.len() / 2]
@@ -143,6 +162,24 @@ mod tests {
     use gapscope_effects::Kind;
 
     const PUSHES: Pushes = Pushes { longest: 0.6, unclear: 0.25 };
+
+    /// Pushes of a fifth of the time bend a fit, and all rows leave some of them: there they stand out of the calm rows alone.
+    #[test]
+    fn pushes_that_bent_a_fit_stand_out_of_its_calm_rows() {
+        let (signals, band, ..) = fitted(Kind::ViscousFriction, torque(|_| 0.0));
+        let rows = band.rows.len();
+        let pushes = |i: usize| i % 50 >= 40;
+        let left = |height: f64| Left {
+            rest: vec![(0..rows).map(|i| if pushes(i) { height } else { 0.5 }).collect(); 2],
+            noise: vec![vec![1.0; rows]; 2],
+        };
+        let found = |height: f64, beside| {
+            stretches(&signals, &band, &left(height), beside, &PUSHES).iter().map(Vec::len).sum::<usize>()
+        };
+        assert_eq!(found(3.0, Beside::Noise), 0);
+        assert!(found(3.0, Beside::Calm) > 3, "{}", found(3.0, Beside::Calm));
+        assert_eq!(found(2.0, Beside::Calm), 0, "no more than four times the calm rows");
+    }
 
     /// The push is as large as the noise of a joint; friction at rest could be anything.
     #[test]

@@ -49,7 +49,7 @@ impl Record<'_> {
                 continue;
             }
             let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
-            let without = chosen.with(Choice { set }, exact, fit);
+            let without = chosen.with(Choice { set: set.clone() }, exact, fit);
             let mut odds = chosen.odds_against(&without, self)?;
             if odds <= 0.0 || !(kind.is_outside() || chosen.concerns_beside(&without)) {
                 chosen = without;
@@ -60,7 +60,17 @@ impl Record<'_> {
                 continue;
             }
             let doubtful = |rival: &&Rival| !kind.is_calibration() && odds.min(rival.odds) < DOUBTFUL;
-            if let Some(rival) = rival.filter(doubtful) {
+            let rival = rival.filter(doubtful);
+            if rival.is_some() {
+                let calibrated = self.calibrated_without(&chosen, set, progress)?;
+                let over = chosen.odds_against(&calibrated, self)?;
+                if over <= 0.0 {
+                    chosen = Chosen { tried: chosen.tried, needed: chosen.needed, ..calibrated };
+                    continue;
+                }
+                odds = odds.min(over);
+            }
+            if let Some(rival) = rival {
                 let mut all = chosen.all.clone();
                 // A delay and a lag are told apart by other means.
                 all.closed.extend(climb::told_together(kind));
@@ -91,6 +101,31 @@ impl Record<'_> {
             chosen.needed.push((kind, odds));
         }
         Ok(chosen)
+    }
+
+    /// The likelier of two accounts with no kind beyond calibration but those of a set: with the best calibration beside it, and
+    /// with all that the robot's description states off by as little as it may be. Of a used arm all of it is off, most of it by
+    /// less than a first look sees; another kind may stand in for the sum.
+    fn calibrated_without(
+        &self,
+        chosen: &Chosen,
+        set: Vec<usize>,
+        progress: Progress<'_>,
+    ) -> Result<Chosen, EffectError> {
+        let mut all = chosen.all.clone();
+        all.closed.extend(all.entries.iter().map(|e| e.candidate.kind).filter(|kind| !kind.is_calibration()));
+        let described = |c: &usize| {
+            let kind = chosen.all.entries[*c].candidate.kind;
+            kind.is_calibration() && kind.card().described
+        };
+        let mut filled: Vec<usize> = (0..all.entries.len()).filter(described).chain(set.iter().copied()).collect();
+        filled.sort_unstable();
+        filled.dedup();
+        let (exact, fit) = self.data(&chosen.noise).exact(&all, &filled, chosen.turned.as_ref())?;
+        let filled = chosen.with(Choice { set: filled }, exact, fit);
+        let mut best = self.converge(all, Choice { set }, chosen.noise.clone(), chosen.turned.clone(), progress)?;
+        best.all.closed.clone_from(&chosen.all.closed);
+        Ok(if filled.odds_against(&best, self)? > 0.0 { filled } else { best })
     }
 
     /// What was chosen with another of its kinds in the joints of one kind, where that is likelier: what is in some joints of a

@@ -37,11 +37,11 @@ impl Record<'_> {
             .collect();
         let noise = noise_floor(&self.signals, &self.band, &nominal, n);
         let bare = rows::at_rows(&self.band, &nominal, n);
-        let mut pushed =
-            contact::stretches(&self.signals, &self.band, &Left { noise: contact::noise(&bare), rest: bare }, &pushes);
+        let left = Left { noise: contact::noise(&bare), rest: bare };
+        let mut pushed = contact::stretches(&self.signals, &self.band, &left, contact::Beside::Noise, &pushes);
         if pushed.iter().all(Vec::is_empty) {
             let left = self.left_beside_pushes(&noise).left;
-            pushed = contact::stretches(&self.signals, &self.band, &left, &pushes);
+            pushed = contact::stretches(&self.signals, &self.band, &left, contact::Beside::Calm, &pushes);
         }
         // What pushes and what the robot itself lacks are told apart by turns: both stand out of a nominal model.
         for look in 0..=LOOKS {

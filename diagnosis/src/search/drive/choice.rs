@@ -110,7 +110,13 @@ impl Record<'_> {
         let stiff = self.converge(best.all.clone(), best.choice.clone(), rigid.noise.clone(), None, progress)?;
         let rigid = if stiff.odds_against(&rigid, self)? > 0.0 { stiff } else { rigid };
         let odds = best.odds_against(&rigid, self)?;
-        if odds <= 0.0 || !best.concerns_beside(&rigid) {
+        let odds = match odds > 0.0 && best.concerns_beside(&rigid) {
+            true => odds - self.gained_by_chance(&best, &rigid)?,
+            false => odds.min(0.0),
+        };
+        if odds <= 0.0 {
+            let own = best.turned.as_ref().map(|turned| &turned.drive);
+            tried.iter_mut().filter(|(drive, _)| Some(drive) == own).for_each(|(_, won)| *won = won.min(odds));
             return Ok(Chosen { tried, ..rigid });
         }
         let turned = best.turned.map(|turned| Turned { odds, ..turned });

@@ -103,9 +103,9 @@ impl Record<'_> {
         Ok(chosen)
     }
 
-    /// The likelier of two accounts with no kind beyond calibration but those of a set: with the best calibration beside it, and
-    /// with all that the robot's description states off by as little as it may be. Of a used arm all of it is off, most of it by
-    /// less than a first look sees; another kind may stand in for the sum.
+    /// The likelier of two accounts with no kind beyond calibration but those of a set: with the best calibration beside it, and,
+    /// where some of what the robot's description states is off, with all of it off by as little as it may be. Of a used arm all
+    /// is, most of it by less than a first look sees; another kind may stand in for the sum.
     fn calibrated_without(
         &self,
         chosen: &Chosen,
@@ -118,13 +118,17 @@ impl Record<'_> {
             let kind = chosen.all.entries[*c].candidate.kind;
             kind.is_calibration() && kind.card().described
         };
-        let mut filled: Vec<usize> = (0..all.entries.len()).filter(described).chain(set.iter().copied()).collect();
+        let choice = Choice { set: set.clone() };
+        let mut best = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
+        best.all.closed.clone_from(&chosen.all.closed);
+        if !set.iter().any(described) {
+            return Ok(best);
+        }
+        let mut filled: Vec<usize> = (0..chosen.all.entries.len()).filter(described).chain(set).collect();
         filled.sort_unstable();
         filled.dedup();
-        let (exact, fit) = self.data(&chosen.noise).exact(&all, &filled, chosen.turned.as_ref())?;
+        let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &filled, chosen.turned.as_ref())?;
         let filled = chosen.with(Choice { set: filled }, exact, fit);
-        let mut best = self.converge(all, Choice { set }, chosen.noise.clone(), chosen.turned.clone(), progress)?;
-        best.all.closed.clone_from(&chosen.all.closed);
         Ok(if filled.odds_against(&best, self)? > 0.0 { filled } else { best })
     }
 

@@ -1,9 +1,9 @@
 //! What a law that filters gains by chance.
 //!
-//! A rotor that flies in a gap, or winds up a spring, takes noise of the effort for its motion: it leaves less than a rigid drive
-//! also where there is no gap. How much less, logs tell whose truth is known: those that the account without the law predicts,
-//! with what it left shuffled in time. That has the spectrum of the noise, and nothing in it that the motion made (surrogate
-//! data; Theiler et al., Physica D 58, 1992).
+//! A rotor that flies in a gap, or winds up a spring, takes noise of the effort for its motion. So it leaves less than a rigid
+//! drive does, also where there is no gap. How much less is told by logs without a gap: what a rigid drive predicts, with what it
+//! leaves shuffled in time. That has the spectrum of the noise, and nothing in it that the motion made (surrogate data; Theiler
+//! et al., Physica D 58, 1992).
 
 use crate::record::logs::Record;
 use crate::record::signals::Signals;
@@ -11,8 +11,7 @@ use crate::search::chosen::{Chosen, Rest};
 use gapscope_effects::EffectError;
 use rayon::prelude::*;
 
-/// What is left by an account, as it may have come as well: turned over or not, and begun at this part of its length; each also
-/// runs backwards where the first says so.
+/// Ways in which what an account leaves may have come as well.
 const SHUFFLES: [Shuffle; 5] = [
     Shuffle { backwards: true, sign: 1.0, begins: 0.0 },
     Shuffle { backwards: false, sign: -1.0, begins: 0.0 },
@@ -21,14 +20,18 @@ const SHUFFLES: [Shuffle; 5] = [
     Shuffle { backwards: false, sign: 1.0, begins: 0.33 },
 ];
 
-/// A signal of the same spectrum.
+/// A signal as it may have come as well, of the same spectrum.
 struct Shuffle {
+    /// Whether time runs backwards.
     backwards: bool,
+    /// 1, or −1 where it is turned over.
     sign: f64,
+    /// Part of its length at which it begins; what comes before follows at its end.
     begins: f64,
 }
 
 impl Shuffle {
+    /// Sample `k` of the shuffled signal.
     fn at(&self, x: &[f64], k: usize) -> f64 {
         let n = x.len();
         let k = if self.backwards { n - 1 - k } else { k };
@@ -37,8 +40,8 @@ impl Shuffle {
 }
 
 impl Record<'_> {
-    /// By how many nats an account is likelier than one without its law in logs in which the latter is true, at the most; nothing
-    /// where it never is.
+    /// By how many nats an account is likelier, at the most, than one without its law in logs in which that one is true; nothing
+    /// where it never is. What was likelier before any log is left out.
     ///
     /// # Errors
     /// An effect that the robot cannot have.
@@ -58,7 +61,7 @@ impl Record<'_> {
         Ok(gained.into_iter().fold(0.0, f64::max))
     }
 
-    /// The logs as the account predicts them that leaves a rest, with that rest shuffled.
+    /// The logs with what an account leaves of them shuffled.
     fn shuffled(&self, rest: &Rest, shuffle: &Shuffle) -> Record<'_> {
         let shuffled = |signals: &[Signals]| -> Vec<Signals> {
             let of = |(s, rest): (&Signals, &Vec<Vec<f64>>)| {

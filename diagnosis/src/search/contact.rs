@@ -1,12 +1,15 @@
 //! When something outside pushed: stretches of time in which the torque leaves what any law of the robot gives.
 
 use crate::numbers::decide::CLEAR;
+use crate::numbers::quantile::quantile;
 use crate::record::band::Band;
 use crate::record::rows::Rows;
 use crate::record::signals::Signals;
 use gapscope_effects::Pushes;
 
-/// First quartile of the size of a standard normal number.
+/// Part of all rows that is calm: pushes may take up the rest.
+const CALM: f64 = 0.25;
+/// The size of a standard normal number below which that part of all lies.
 const QUARTER: f64 = 0.3186;
 /// Stretches closer than this are one, and shorter ones none, s.
 const SHORTEST: f64 = 0.12;
@@ -52,36 +55,29 @@ pub fn noise(rest: &Rows) -> Rows {
 
 /// Noise of a joint: from the calm rows, as pushes may take up many.
 fn spread(row: &[f64]) -> f64 {
-    quarter(&row.iter().map(|r| r.abs()).collect::<Vec<_>>()) / QUARTER
+    quantile(&row.iter().map(|r| r.abs()).collect::<Vec<_>>(), CALM) / QUARTER
 }
 
-/// The first quartile; 0 of nothing.
-fn quarter(x: &[f64]) -> f64 {
-    let mut sorted = x.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 4).copied().unwrap_or(0.0)
-}
-
-/// Beside what the stretches of every episode, s since its start, stand out.
+/// What pushes stand out of.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Beside {
+pub enum Ground {
     /// Noise.
     Noise,
-    /// What the calm quarter of all rows leaves, where that is less: of a fit that pushes have bent, all rows leave some of them.
-    Calm,
+    /// The calm rows, where these leave less than noise: a fit that pushes have bent leaves some of them in all rows.
+    CalmRows,
 }
 
-/// The stretches of every episode, s since its start, in which what is left stands out.
-pub fn stretches(signals: &[Signals], band: &Band, left: &Left, beside: Beside, pushes: &Pushes) -> Vec<Vec<[f64; 2]>> {
+/// The stretches of every episode, s since its start, in which what is left stands out of some ground.
+pub fn stretches(signals: &[Signals], band: &Band, left: &Left, ground: Ground, pushes: &Pushes) -> Vec<Vec<[f64; 2]>> {
     let height: Vec<f64> = (0..band.rows.len())
         .map(|i| {
             let square: f64 = left.told(i).map(|j| (left.rest[j][i] / left.noise[j][i]).powi(2)).sum();
             (square / left.told(i).count().max(1) as f64).sqrt()
         })
         .collect();
-    let calm = match beside {
-        Beside::Noise => 1.0,
-        Beside::Calm => quarter(&height).min(1.0),
+    let calm = match ground {
+        Ground::Noise => 1.0,
+        Ground::CalmRows => quantile(&height, CALM).min(1.0),
     };
     let stands_out = CLEAR.get() * calm;
     let outside = height.iter().filter(|h| **h > stands_out).count();
@@ -173,12 +169,12 @@ mod tests {
             rest: vec![(0..rows).map(|i| if pushes(i) { height } else { 0.5 }).collect(); 2],
             noise: vec![vec![1.0; rows]; 2],
         };
-        let found = |height: f64, beside| {
-            stretches(&signals, &band, &left(height), beside, &PUSHES).iter().map(Vec::len).sum::<usize>()
+        let found = |height: f64, ground| {
+            stretches(&signals, &band, &left(height), ground, &PUSHES).iter().map(Vec::len).sum::<usize>()
         };
-        assert_eq!(found(3.0, Beside::Noise), 0);
-        assert!(found(3.0, Beside::Calm) > 3, "{}", found(3.0, Beside::Calm));
-        assert_eq!(found(2.0, Beside::Calm), 0, "no more than four times the calm rows");
+        assert_eq!(found(3.0, Ground::Noise), 0);
+        assert!(found(3.0, Ground::CalmRows) > 3, "{}", found(3.0, Ground::CalmRows));
+        assert_eq!(found(2.0, Ground::CalmRows), 0, "no more than four times the calm rows");
     }
 
     /// The push is as large as the noise of a joint; friction at rest could be anything.

@@ -38,10 +38,10 @@ impl Record<'_> {
         let noise = noise_floor(&self.signals, &self.band, &nominal, n);
         let bare = rows::at_rows(&self.band, &nominal, n);
         let left = Left { noise: contact::noise(&bare), rest: bare };
-        let mut pushed = contact::stretches(&self.signals, &self.band, &left, contact::Beside::Noise, &pushes);
+        let mut pushed = contact::stretches(&self.signals, &self.band, &left, contact::Ground::Noise, &pushes);
         if pushed.iter().all(Vec::is_empty) {
             let left = self.left_beside_pushes(&noise).left;
-            pushed = contact::stretches(&self.signals, &self.band, &left, contact::Beside::Calm, &pushes);
+            pushed = contact::stretches(&self.signals, &self.band, &left, contact::Ground::CalmRows, &pushes);
         }
         // What pushes and what the robot itself lacks are told apart by turns: both stand out of a nominal model.
         for look in 0..=LOOKS {

@@ -55,6 +55,8 @@ fn every_kind_has_its_line_and_no_figure_without_logs() {
         let ledger = export(target, &robot, &corrected, &[]).unwrap().ledger;
         assert!(ledger.notes.iter().any(|note| note.contains("1.00e-4 s")), "{:?}", ledger.notes);
         assert_eq!((ledger.shrink, ledger.shrink_here), (None, None));
+        let drake = ledger.notes.iter().any(|note| note.starts_with("Drake reads no `friction`"));
+        assert_eq!(drake, target == Target::Urdf, "{:?}", ledger.notes);
         for kind in &kinds {
             assert!(ledger.effects.iter().any(|entry| entry.kind == kind.name()), "{target:?} {kind}");
         }

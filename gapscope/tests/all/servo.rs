@@ -25,6 +25,10 @@ fn what_was_found_of_a_drive_is_evaluated_rolled_out_and_simulated_again() {
     };
     let found = json(dir.path(), &["diagnose", "robot.urdf", "log.csv", "--out", "found", "--json"]);
     assert_eq!(kinds(&found), ["coulomb_friction"]);
+    // What to change is told where the answer is, as the page has it to paste.
+    let told = run(&["diagnose", "robot.urdf", "log.csv", "--out", "found", "--force"]);
+    let words = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("Change in the URDF: ") && words.contains("actuators of an MJCF: "), "{told}");
 
     // Its own set points give logs that hold its drive and its effect, and no torque.
     let with = "found/corrected.json";

@@ -49,7 +49,6 @@ fn a_spring_behind_an_encoder_on_the_link() {
 }
 
 #[test]
-#[ignore = "half a minute to a minute: cargo test -p gapscope-tests -- --ignored a_spring_behind_an_encoder_on_the_motor"]
 fn a_spring_behind_an_encoder_on_the_motor() {
     named(None, 0.9, true);
 }
@@ -60,7 +59,6 @@ fn play_behind_an_encoder_on_the_link() {
 }
 
 #[test]
-#[ignore = "half a minute to a minute: cargo test -p gapscope-tests -- --ignored play_behind_an_encoder_on_the_motor"]
 fn play_behind_an_encoder_on_the_motor() {
     named(Some(0.02), 0.9, true);
 }

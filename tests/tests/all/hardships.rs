@@ -121,7 +121,6 @@ fn one_run_of_ten_seconds() {
 }
 
 #[test]
-#[ignore = "half a minute to a minute: cargo test -p gapscope-tests -- --ignored fifty_runs_of_two_seconds"]
 fn fifty_runs_of_two_seconds() {
     told(&logs(50, &Recipe { seconds: 2.0, ..ordinary() }), 0.02);
 }

@@ -152,7 +152,6 @@ fn shrinks(set: &str, prefix: &str) {
 }
 
 #[test]
-#[ignore = "half a minute to a minute: cargo test -p gapscope-tests -- --ignored kinova_gen3_shrinks"]
 fn kinova_gen3_shrinks() {
     shrinks("kinova_gen3", "");
 }

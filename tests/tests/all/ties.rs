@@ -43,7 +43,6 @@ fn beside_links_that_were_weighed_a_light_load_is_a_load() {
 /// On a used arm, whose links are all off by a little, a load of many times its link is told from them: the last link could
 /// take it over, had it not a mass of its own.
 #[test]
-#[ignore = "half a minute to a minute: cargo test -p gapscope-tests -- --ignored a_load_of_many_times_its_link_is_none_of_the_link"]
 fn a_load_of_many_times_its_link_is_none_of_the_link() {
     let model = robot("arm6");
     let scale = |x: &[f64]| -> Vec<f64> { x.iter().map(|x| 0.06 * x).collect() };

@@ -236,7 +236,6 @@ fn a_joint_counted_the_other_way_round_gives_the_same_diagnosis() {
 
 /// More noise: the same names, wider intervals.
 #[test]
-#[ignore = "half a minute to a minute: cargo test -p gapscope-tests -- --ignored more_noise_widens_the_intervals"]
 fn more_noise_widens_the_intervals() {
     let model = robot("arm6");
     let truth = [viscous([("joint2", 8.0)]), coulomb([("joint3", 6.0)])];

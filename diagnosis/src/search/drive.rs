@@ -124,7 +124,7 @@ impl Record<'_> {
     ) -> Result<Vec<Account>, EffectError> {
         let runs = self.joint_runs(problem, others)?;
         let mut found: Vec<Account> =
-            joints.par_iter().flat_map_iter(|&j| Study::new(self, &runs, j, through).best()).collect();
+            joints.par_iter().flat_map(|&j| Study::new(self, &runs, j, through).best()).collect();
         found.sort_by(|a, b| b.beyond.total_cmp(&a.beyond));
         Ok(found)
     }
@@ -208,10 +208,13 @@ impl<'a> Study<'a> {
         let left_of = |e: usize| mean_square(&rest[self.logs.band.of_episode[e].clone()]);
         let episode = (0..self.runs.len()).max_by(|&a, &b| left_of(a).total_cmp(&left_of(b)));
         let first = self.rigid_in(View { episode, smooth: None });
-        [EncoderSide::Link, EncoderSide::Motor]
+        let tried: Vec<(Kind, Turning, EncoderSide)> = [EncoderSide::Link, EncoderSide::Motor]
             .into_iter()
             .flat_map(|side| turning().map(move |(kind, turning)| (kind, turning, side)))
             .filter(|(_, turning, side)| !self.through || turning.filtered == Some(*side))
+            .collect();
+        tried
+            .into_par_iter()
             .flat_map(|(kind, turning, side)| self.best_of(kind, turning, side, episode, &first))
             .collect()
     }

@@ -12,6 +12,7 @@ use crate::search::climb::Choice;
 use crate::search::converge::weighing;
 use crate::search::drive::Account;
 use gapscope_effects::{Candidate, EffectError};
+use rayon::prelude::*;
 
 /// Accounts of drives that are turned beside each base: of those likelier than a rigid drive, the likeliest. One goes on.
 const ACCOUNTS: usize = 2;
@@ -77,32 +78,20 @@ impl Record<'_> {
         bases.push(base(&rigid, joints, true));
         let mut best: Option<Chosen> = None;
         let mut tried: Vec<(Candidate, f64)> = Vec::new();
-        for base in bases {
-            if base.through && best.is_some() {
+        let (through, plain) = bases.into_iter().partition::<Vec<_>, _>(|base| base.through);
+        for bases in [plain, through] {
+            if best.is_some() {
                 break;
             }
-            let (likelier, others) = self.likelier(&base)?.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > 0.0);
-            tried.extend(others.into_iter().filter_map(|(chosen, odds)| Some((chosen.turned?.drive, odds))));
-            let mut turned: Vec<(Chosen, f64)> = Vec::new();
-            for (beside, _) in likelier.into_iter().take(ACCOUNTS) {
-                let beside = self.turned(beside, base.through)?;
-                let odds = beside.odds_against(&base.rigid, self)?;
-                turned.push((beside, odds));
-            }
-            turned.sort_by(|a, b| b.1.total_cmp(&a.1));
-            let Some((beside, _)) = turned.into_iter().next() else { continue };
-            // Beside what was found as it is, and with the choice made again around it.
-            let Chosen { all, choice, noise, turned, .. } = beside.clone();
-            let next = self.converge(all, choice, noise, turned, progress)?;
-            let next = if beside.odds_against(&next, self)? > 0.0 { beside } else { next };
-            let Some(drive) = next.turned.as_ref().map(|turned| turned.drive.clone()) else { continue };
-            if !next.has_rotor() {
-                continue;
-            }
-            let odds = next.odds_against(best.as_ref().unwrap_or(&rigid), self)?;
-            tried.push((drive, odds));
-            if odds > 0.0 {
-                best = Some(next);
+            let found = bases.par_iter().map(|base| self.best_beside(base, progress)).collect::<Result<Vec<_>, _>>()?;
+            for (next, others) in found {
+                tried.extend(others);
+                let Some(next) = next.filter(Chosen::has_rotor) else { continue };
+                let odds = next.odds_against(best.as_ref().unwrap_or(&rigid), self)?;
+                tried.extend(next.turned.as_ref().map(|turned| (turned.drive.clone(), odds)));
+                if odds > 0.0 {
+                    best = Some(next);
+                }
             }
         }
         let Some(best) = best else { return Ok(Chosen { tried, ..rigid }) };
@@ -123,11 +112,35 @@ impl Record<'_> {
         Ok(Chosen { turned, tried, ..best })
     }
 
+    /// The likeliest account of a drive beside a base, the choice made again around it, where one is likelier than a rigid drive;
+    /// and the accounts that are not, with by how many nats.
+    fn best_beside(
+        &self,
+        base: &Base,
+        progress: Progress<'_>,
+    ) -> Result<(Option<Chosen>, Vec<(Candidate, f64)>), EffectError> {
+        let (likelier, others) = self.likelier(base)?.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > 0.0);
+        let others = others.into_iter().filter_map(|(chosen, odds)| Some((chosen.turned?.drive, odds))).collect();
+        let turned = |(beside, _): (Chosen, f64)| {
+            let beside = self.turned(beside, base.through)?;
+            let odds = beside.odds_against(&base.rigid, self)?;
+            Ok((beside, odds))
+        };
+        let likelier: Vec<_> = likelier.into_iter().take(ACCOUNTS).collect();
+        let mut turned = likelier.into_par_iter().map(turned).collect::<Result<Vec<_>, EffectError>>()?;
+        turned.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let Some((beside, _)) = turned.into_iter().next() else { return Ok((None, others)) };
+        // Beside what was found as it is, and with the choice made again around it.
+        let Chosen { all, choice, noise, turned, .. } = beside.clone();
+        let next = self.converge(all, choice, noise, turned, progress)?;
+        let next = if beside.odds_against(&next, self)? > 0.0 { beside } else { next };
+        Ok((Some(next), others))
+    }
+
     /// The accounts of drives beside a base, each at its exact law, and by how many nats it is likelier than rigid drives;
     /// likeliest first.
     fn likelier(&self, base: &Base) -> Result<Vec<(Chosen, f64)>, EffectError> {
-        let mut found: Vec<(Chosen, f64)> = Vec::new();
-        for account in self.accounts(&base.joints, &base.others.0, &base.others.1, base.through)? {
+        let at_exact_law = |account: Account| {
             let (all, place) = self.with_rotor(&base.rigid, account.drive.joints[0]);
             let mut set = [base.choice.set.as_slice(), &[place]].concat();
             set.sort_unstable();
@@ -136,8 +149,10 @@ impl Record<'_> {
             let (exact, fit) = self.data(&base.rigid.noise).exact(&all, &set, Some(&turned))?;
             let beside = Chosen { all, turned: Some(turned), ..base.rigid.with(Choice { set }, exact, fit) };
             let odds = beside.odds_against(&base.rigid, self)?;
-            found.push((beside, odds));
-        }
+            Ok((beside, odds))
+        };
+        let accounts = self.accounts(&base.joints, &base.others.0, &base.others.1, base.through)?;
+        let mut found = accounts.into_par_iter().map(at_exact_law).collect::<Result<Vec<_>, EffectError>>()?;
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         Ok(found)
     }

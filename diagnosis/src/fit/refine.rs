@@ -207,20 +207,13 @@ impl Data<'_> {
     }
 
     /// The problem of some candidates alone, linear about the parameters that fit best, and the fit (Gauss–Newton in the
-    /// knobs, chords in what else bends; friction under load about the load that [`Data::loaded`] tells).
+    /// knobs, chords in what else bends; friction under load about the load that [`Data::loaded`] tells). It begins from
+    /// coefficients that the candidates had before, see [`Fit::coefficients`], where they had any: a drive that turns on its own
+    /// begins with the rotor of its account.
     ///
     /// # Errors
     /// An effect that the robot cannot have.
-    pub fn refine(&self, candidates: &[Candidate]) -> Result<(Problem, Fit), EffectError> {
-        self.refine_from(candidates, None)
-    }
-
-    /// The same from coefficients that the candidates had before, see [`Fit::coefficients`], where they had any: a drive that
-    /// turns on its own begins with the rotor of its account.
-    ///
-    /// # Errors
-    /// An effect that the robot cannot have.
-    pub fn refine_from(
+    pub fn refine(
         &self,
         candidates: &[Candidate],
         start: Option<Vec<Option<Vec<f64>>>>,

@@ -138,7 +138,7 @@ impl Data<'_> {
         turned: Option<&Turned>,
     ) -> Result<(Problem, Fit), EffectError> {
         let candidates = with_drive(all, set, turned);
-        self.refine_from(&candidates, turned.and_then(|turned| turned.start(&candidates)))
+        self.refine(&candidates, turned.and_then(|turned| turned.start(&candidates)))
     }
 }
 

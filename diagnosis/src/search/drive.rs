@@ -122,6 +122,9 @@ impl Record<'_> {
         others: &Fit,
         through: bool,
     ) -> Result<Vec<Account>, EffectError> {
+        if joints.is_empty() {
+            return Ok(Vec::new());
+        }
         let runs = self.joint_runs(problem, others)?;
         let mut found: Vec<Account> =
             joints.par_iter().flat_map(|&j| Study::new(self, &runs, j, through).best()).collect();

@@ -7,84 +7,45 @@ use crate::numbers::decide::FLOOR_KNOWN_TO;
 use crate::record::floor::noise_floor;
 use crate::record::logs::{Progress, Record};
 use crate::search::chosen::{Chosen, Turned};
-use crate::search::climb;
 use crate::search::climb::Choice;
 use crate::search::converge::weighing;
 use crate::search::drive::Account;
-use gapscope_effects::{Candidate, EffectError};
+use gapscope_effects::{Candidate, EffectError, Place};
 use rayon::prelude::*;
 
-/// Accounts of drives that are turned beside each base: of those likelier than a rigid drive, the likeliest. One goes on.
+/// Accounts of drives that are turned: of those likelier than a rigid drive, the likeliest. One goes on.
 const ACCOUNTS: usize = 2;
 /// Turns that a drive and what stands beside it take, at most, and the fall of the misfit that is worth another.
 const TURNS: usize = 6;
 const TURN_LEAVES: f64 = 10.0;
 
-/// What accounts of drives are tried beside.
-struct Base {
-    /// What was found, rotors aside.
-    others: (Problem, Fit),
-    /// What goes into the choice with a drive.
-    choice: Choice,
-    /// The same with rigid drives: a drive that is not likelier is none.
-    rigid: Chosen,
-    /// Joints that are looked at.
-    joints: Vec<usize>,
-    /// Whether springs are looked for through a filter.
-    through: bool,
-}
-
 impl Record<'_> {
     /// Puts a spring or play in the drive of one joint where the logs speak for it: beside all else that was found, beside the
-    /// calibration alone, and where noise may have drowned what a spring does, through a filter.
+    /// same without laws of the joint that may stand in for its drive, and, where noise may have drowned what a
+    /// spring does, through a filter.
     pub(crate) fn drive(&self, rigid: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        // Beside what was found, beside its calibration alone, fitted anew without rotors, and beside the best calibration.
-        let without_rotors = |of: &Chosen| {
-            let entries = &of.exact.entries;
-            let beside = (0..entries.len()).filter(|&i| !entries[i].candidate.kind.card().rotor).collect();
-            (of.exact.clone(), Fit { set: beside, ..of.fit.clone() })
+        let joints = self.restless(&rigid)?;
+        let stands_in = |c: &usize| {
+            let kind = rigid.all.entries[*c].candidate.kind;
+            !kind.is_calibration() && kind.card().place == Place::Joint
         };
-        let restless = |exact: &Problem, fit: &Fit| self.restless(&rigid.noise, exact, fit);
-        // What was found beyond calibration may stand in for a drive: beside calibration alone more is left.
-        let base = |of: &Chosen, joints: Vec<usize>, through: bool| Base {
-            others: without_rotors(of),
-            choice: of.choice.clone(),
-            rigid: of.clone(),
-            joints,
-            through,
-        };
-        let mut bases = vec![base(&rigid, restless(&rigid.exact, &rigid.fit)?, false)];
-        if climb::kinds(&rigid.all, &rigid.choice.set).into_iter().any(|kind| !kind.is_calibration()) {
-            let calibration = |c: &&Candidate| c.kind.is_calibration() && !c.kind.card().rotor;
-            let bodies: Vec<Candidate> =
-                rigid.exact.entries.iter().map(|e| &e.candidate).filter(calibration).cloned().collect();
-            let mut choice = rigid.choice.clone();
-            choice.set.retain(|&c| rigid.all.entries[c].candidate.kind.is_calibration());
-            let calibrated = self.calibrated(&rigid, progress)?;
-            let has_rotor = calibrated.exact.entries.iter().any(|e| e.candidate.kind.card().rotor);
-            if has_rotor || calibrated.choice.set != choice.set {
-                let others = self.data(&rigid.noise).refine(&bodies)?;
-                let joints = restless(&others.0, &others.1)?;
-                bases.push(Base { others, choice, rigid: calibrated.clone(), joints, through: false });
-            }
-            let joints = restless(&calibrated.exact, &calibrated.fit)?;
-            bases.push(base(&calibrated, joints, false));
+        let (laws, set): (Vec<usize>, Vec<usize>) = rigid.choice.set.iter().partition(|c| stands_in(c));
+        let mut bases = vec![(rigid.clone(), joints)];
+        if !laws.is_empty() {
+            let (exact, fit) = self.data(&rigid.noise).exact(&rigid.all, &set, None)?;
+            let without = rigid.with(Choice { set }, exact, fit);
+            let mut joints = self.restless(&without)?;
+            joints.retain(|joint| laws.iter().any(|&c| rigid.all.entries[c].candidate.joints.contains(joint)));
+            bases.push((without, joints));
         }
-        let any = |j: &usize| bases.iter().any(|base| base.joints.contains(j));
-        let joints: Vec<usize> = (0..self.model.dof()).filter(any).collect();
-        if joints.is_empty() {
-            return Ok(rigid);
-        }
-        bases.push(base(&rigid, joints, true));
         let mut best: Option<Chosen> = None;
         let mut tried: Vec<(Candidate, f64)> = Vec::new();
-        let (through, plain) = bases.into_iter().partition::<Vec<_>, _>(|base| base.through);
-        for bases in [plain, through] {
+        for (bases, through) in [(&bases[..], false), (&bases[..1], true)] {
             if best.is_some() {
                 break;
             }
-            let found = bases.par_iter().map(|base| self.best_beside(base, progress)).collect::<Result<Vec<_>, _>>()?;
-            for (next, others) in found {
+            let beside = |(base, joints): &(Chosen, Vec<usize>)| self.best_beside(base, joints, through, progress);
+            for (next, others) in bases.par_iter().map(beside).collect::<Result<Vec<_>, _>>()? {
                 tried.extend(others);
                 let Some(next) = next.filter(Chosen::has_rotor) else { continue };
                 let odds = next.odds_against(best.as_ref().unwrap_or(&rigid), self)?;
@@ -112,18 +73,21 @@ impl Record<'_> {
         Ok(Chosen { turned, tried, ..best })
     }
 
-    /// The likeliest account of a drive beside a base, the choice made again around it, where one is likelier than a rigid drive;
-    /// and the accounts that are not, with by how many nats.
+    /// The likeliest account of a drive beside what was found, the choice made again around it, where one is likelier than a rigid
+    /// drive; and the accounts that are not, with by how many nats.
     fn best_beside(
         &self,
-        base: &Base,
+        rigid: &Chosen,
+        joints: &[usize],
+        through: bool,
         progress: Progress<'_>,
     ) -> Result<(Option<Chosen>, Vec<(Candidate, f64)>), EffectError> {
-        let (likelier, others) = self.likelier(base)?.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > 0.0);
+        let accounts = self.likelier(rigid, joints, through)?;
+        let (likelier, others) = accounts.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > 0.0);
         let others = others.into_iter().filter_map(|(chosen, odds)| Some((chosen.turned?.drive, odds))).collect();
         let turned = |(beside, _): (Chosen, f64)| {
-            let beside = self.turned(beside, base.through)?;
-            let odds = beside.odds_against(&base.rigid, self)?;
+            let beside = self.turned(beside, through)?;
+            let odds = beside.odds_against(rigid, self)?;
             Ok((beside, odds))
         };
         let likelier: Vec<_> = likelier.into_iter().take(ACCOUNTS).collect();
@@ -137,21 +101,24 @@ impl Record<'_> {
         Ok((Some(next), others))
     }
 
-    /// The accounts of drives beside a base, each at its exact law, and by how many nats it is likelier than rigid drives;
-    /// likeliest first.
-    fn likelier(&self, base: &Base) -> Result<Vec<(Chosen, f64)>, EffectError> {
+    /// The accounts of drives beside what was found, each at its exact law, and by how many nats it is likelier than rigid
+    /// drives; likeliest first.
+    fn likelier(&self, rigid: &Chosen, joints: &[usize], through: bool) -> Result<Vec<(Chosen, f64)>, EffectError> {
+        let entries = &rigid.exact.entries;
+        let set = (0..entries.len()).filter(|&i| !entries[i].candidate.kind.card().rotor).collect();
+        let others = Fit { set, ..rigid.fit.clone() };
         let at_exact_law = |account: Account| {
-            let (all, place) = self.with_rotor(&base.rigid, account.drive.joints[0]);
-            let mut set = [base.choice.set.as_slice(), &[place]].concat();
+            let (all, place) = self.with_rotor(rigid, account.drive.joints[0]);
+            let mut set = [rigid.choice.set.as_slice(), &[place]].concat();
             set.sort_unstable();
             set.dedup();
             let turned = Turned { place, drive: account.drive, odds: 0.0, beside: Vec::new() };
-            let (exact, fit) = self.data(&base.rigid.noise).exact(&all, &set, Some(&turned))?;
-            let beside = Chosen { all, turned: Some(turned), ..base.rigid.with(Choice { set }, exact, fit) };
-            let odds = beside.odds_against(&base.rigid, self)?;
+            let (exact, fit) = self.data(&rigid.noise).exact(&all, &set, Some(&turned))?;
+            let beside = Chosen { all, turned: Some(turned), ..rigid.with(Choice { set }, exact, fit) };
+            let odds = beside.odds_against(rigid, self)?;
             Ok((beside, odds))
         };
-        let accounts = self.accounts(&base.joints, &base.others.0, &base.others.1, base.through)?;
+        let accounts = self.accounts(joints, &rigid.exact, &others, through)?;
         let mut found = accounts.into_par_iter().map(at_exact_law).collect::<Result<Vec<_>, EffectError>>()?;
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         Ok(found)
@@ -182,20 +149,10 @@ impl Record<'_> {
         Ok(best)
     }
 
-    /// The best account of calibration alone: what was found beyond it may stand in for a drive.
-    fn calibrated(&self, rigid: &Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        let (mut all, mut choice) = (rigid.all.clone(), rigid.choice.clone());
-        all.closed.extend(all.entries.iter().map(|e| e.candidate.kind).filter(|kind| !kind.is_calibration()));
-        choice.set.retain(|&c| all.entries[c].candidate.kind.is_calibration());
-        let mut calibrated = self.converge(all, choice, rigid.noise.clone(), None, progress)?;
-        // What comes with a drive may be any kind.
-        calibrated.all.closed.clone_from(&rigid.all.closed);
-        Ok(calibrated)
-    }
-
-    /// Joints of which a fit leaves more than noise, those with most of it first.
-    fn restless(&self, noise: &[f64], exact: &Problem, fit: &Fit) -> Result<Vec<usize>, EffectError> {
-        let rest = self.data(noise).rest(exact, fit)?;
+    /// Joints of which a choice leaves more than noise, those with most of it first.
+    fn restless(&self, chosen: &Chosen) -> Result<Vec<usize>, EffectError> {
+        let (exact, fit) = (&chosen.exact, &chosen.fit);
+        let rest = self.data(&chosen.noise).rest(exact, fit)?;
         let floor = noise_floor(&self.signals, &self.band, &rest, self.model.dof());
         // Play shows for moments alone: what it leaves then counts in full.
         let left = exact.left(fit);

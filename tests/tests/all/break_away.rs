@@ -7,7 +7,6 @@ use gapscope_tests::{diagnose, recipe, robot};
 use std::collections::BTreeMap;
 
 #[test]
-#[ignore = "a rotor of a ten-thousandth kg m² beside it, on other seeds a play of a third of a mrad: issue 23"]
 fn static_friction_is_what_a_wrist_holds_at_rest() {
     let model = robot("arm6");
     let on =

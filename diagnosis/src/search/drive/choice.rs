@@ -19,6 +19,9 @@ const ACCOUNTS: usize = 2;
 const TURNS: usize = 6;
 const TURN_LEAVES: f64 = 10.0;
 
+/// Drives that were tried, and by how many nats each is likelier than a rigid one.
+type Tried = Vec<(Candidate, f64)>;
+
 impl Record<'_> {
     /// Puts a spring or play in the drive of one joint where the logs speak for it: beside all else that was found, beside the
     /// same without laws of the joint that may stand in for its drive, and, where noise may have drowned what a
@@ -39,7 +42,7 @@ impl Record<'_> {
             bases.push((without, joints));
         }
         let mut best: Option<Chosen> = None;
-        let mut tried: Vec<(Candidate, f64)> = Vec::new();
+        let mut tried = Tried::new();
         for (bases, through) in [(&bases[..], false), (&bases[..1], true)] {
             if best.is_some() {
                 break;
@@ -81,7 +84,7 @@ impl Record<'_> {
         joints: &[usize],
         through: bool,
         progress: Progress<'_>,
-    ) -> Result<(Option<Chosen>, Vec<(Candidate, f64)>), EffectError> {
+    ) -> Result<(Option<Chosen>, Tried), EffectError> {
         let accounts = self.likelier(rigid, joints, through)?;
         let (likelier, others) = accounts.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > 0.0);
         let others = others.into_iter().filter_map(|(chosen, odds)| Some((chosen.turned?.drive, odds))).collect();

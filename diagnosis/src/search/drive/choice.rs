@@ -28,26 +28,18 @@ impl Record<'_> {
     /// spring does, through a filter.
     pub(crate) fn drive(&self, rigid: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let joints = self.restless(&rigid)?;
-        let stands_in = |c: &usize| {
-            let kind = rigid.all.entries[*c].candidate.kind;
-            !kind.is_calibration() && kind.card().place == Place::Joint
-        };
-        let (laws, set): (Vec<usize>, Vec<usize>) = rigid.choice.set.iter().partition(|c| stands_in(c));
-        let mut bases = vec![(rigid.clone(), joints)];
-        if !laws.is_empty() {
-            let (exact, fit) = self.data(&rigid.noise).exact(&rigid.all, &set, None)?;
-            let without = rigid.with(Choice { set }, exact, fit);
-            let mut joints = self.restless(&without)?;
-            joints.retain(|joint| laws.iter().any(|&c| rigid.all.entries[c].candidate.joints.contains(joint)));
-            bases.push((without, joints));
-        }
+        let without = self.without_laws_of_joints(&rigid)?;
+        let plain: Vec<(&Chosen, &[usize])> = [(&rigid, &joints[..])]
+            .into_iter()
+            .chain(without.iter().map(|(base, joints)| (base, &joints[..])))
+            .collect();
         let mut best: Option<Chosen> = None;
         let mut tried = Tried::new();
-        for (bases, through) in [(&bases[..], false), (&bases[..1], true)] {
+        for (bases, through) in [(&plain[..], false), (&plain[..1], true)] {
             if best.is_some() {
                 break;
             }
-            let beside = |(base, joints): &(Chosen, Vec<usize>)| self.best_beside(base, joints, through, progress);
+            let beside = |(base, joints): &(&Chosen, &[usize])| self.best_beside(base, joints, through, progress);
             for (next, others) in bases.par_iter().map(beside).collect::<Result<Vec<_>, _>>()? {
                 tried.extend(others);
                 let Some(next) = next.filter(Chosen::has_rotor) else { continue };
@@ -74,6 +66,25 @@ impl Record<'_> {
         }
         let turned = best.turned.map(|turned| Turned { odds, ..turned });
         Ok(Chosen { turned, tried, ..best })
+    }
+
+    /// What was found without the laws of joints beyond calibration, and the joints of those laws that are restless then: a law of a
+    /// joint may stand in for its drive. Nothing where no such law was found.
+    fn without_laws_of_joints(&self, found: &Chosen) -> Result<Option<(Chosen, Vec<usize>)>, EffectError> {
+        let candidate = |c: usize| &found.all.entries[c].candidate;
+        let is_law = |c: &usize| {
+            let kind = candidate(*c).kind;
+            !kind.is_calibration() && kind.card().place == Place::Joint
+        };
+        let (laws, set): (Vec<usize>, Vec<usize>) = found.choice.set.iter().partition(|c| is_law(c));
+        if laws.is_empty() {
+            return Ok(None);
+        }
+        let (exact, fit) = self.data(&found.noise).exact(&found.all, &set, None)?;
+        let without = found.with(Choice { set }, exact, fit);
+        let mut joints = self.restless(&without)?;
+        joints.retain(|joint| laws.iter().any(|&c| candidate(c).joints.contains(joint)));
+        Ok(Some((without, joints)))
     }
 
     /// The likeliest account of a drive beside what was found, the choice made again around it, where one is likelier than a rigid

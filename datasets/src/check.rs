@@ -11,7 +11,7 @@ mod velocity;
 
 pub(crate) use dynamics::{Fit, fit};
 pub(crate) use position::excess;
-pub(crate) use signal::Traits;
+pub(crate) use signal::{Traits, prediction_errors, trimmed_rms};
 pub(crate) use velocity::Relation;
 
 use crate::episode::Episode;

@@ -40,6 +40,7 @@ mod rows;
 mod scale;
 mod sensors;
 mod servo;
+mod steady;
 mod suggest;
 mod table;
 mod time_stamps;

@@ -66,9 +66,27 @@ pub(crate) fn split(table: Table, name: &str) -> (Vec<Episode>, Vec<String>) {
         }
     }
     if !parts.is_empty() {
-        notes.extend(jitter(&steps, dt, &is_gap));
+        notes.extend(steadied(&mut parts).or_else(|| jitter(&steps, dt, &is_gap)));
     }
     (parts, notes)
+}
+
+/// Puts parts on the steady clocks by which they were sampled, where their stamps jitter; says so where there are any.
+fn steadied(parts: &mut [Episode]) -> Option<String> {
+    let mut most: Option<f64> = None;
+    for part in parts {
+        if let Some(time) = part.steady_time() {
+            let off = part.time.iter().zip(&time).map(|(stamp, steady)| (stamp - steady).abs()).fold(0.0, f64::max);
+            most = Some(most.unwrap_or(0.0f64).max(off / part.dt()));
+            part.time = time;
+        }
+    }
+    most.map(|most| {
+        format!(
+            "time stamps jitter by up to {:.0} % of a step, and the positions are smooth without that: read as sampled at a steady rate",
+            100.0 * most
+        )
+    })
 }
 
 /// What there is to say about the steps between the gaps.

@@ -78,7 +78,7 @@ pub(super) fn range(value: &[f64]) -> (f64, f64) {
 }
 
 /// Each sample less what the cubic through its two neighbours on each side says; zero at the ends.
-pub(super) fn prediction_errors(time: &[f64], value: &[f64]) -> Vec<f64> {
+pub(crate) fn prediction_errors(time: &[f64], value: &[f64]) -> Vec<f64> {
     let mut errors = vec![0.0; value.len()];
     for k in 2..value.len().saturating_sub(2) {
         let at = [k - 2, k - 1, k + 1, k + 2];
@@ -99,7 +99,7 @@ pub(super) fn prediction_errors(time: &[f64], value: &[f64]) -> Vec<f64> {
 }
 
 /// Standard deviation of a normal signal with the same root mean square of all but the largest twentieth.
-pub(super) fn trimmed_rms(values: &[f64]) -> f64 {
+pub(crate) fn trimmed_rms(values: &[f64]) -> f64 {
     let mut magnitudes: Vec<f64> = values.iter().map(|x| x.abs()).collect();
     let Some(limit) = quantile(&mut magnitudes, 0.95) else {
         return 0.0;

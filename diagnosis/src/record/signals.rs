@@ -76,9 +76,9 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Signals of an episode, its position's glitches mended; `None` where it is shorter than the kernel.
+    /// Signals of an episode, its position's glitches and its clock mended; `None` where it is shorter than the kernel.
     pub fn new(model: &Model, episode: &Episode) -> Option<Signals> {
-        let episode = episode.without_glitches();
+        let episode = episode.without_glitches().steadied();
         let dt = 1.0 / episode.rate();
         let raw = resample(&episode, dt);
         let kernel = derivative_kernel(dt);
@@ -146,7 +146,7 @@ impl Signals {
     /// Signals of the same run with a part of the noise that its position has once more, white.
     pub fn noisier(&self, model: &Model, episode: &Episode, part: f64, seed: u64) -> Option<Signals> {
         let mut random = Pcg64::seed_from_u64(seed);
-        let mut episode = episode.without_glitches();
+        let mut episode = episode.without_glitches().steadied();
         for (x, size) in episode.position.iter_mut().zip(&self.position_noise) {
             x.iter_mut().for_each(|x| *x += part * size * random.sample::<f64, _>(StandardNormal));
         }
@@ -180,8 +180,9 @@ impl Signals {
         let wide = (self.held.len() as f64 / 2.0 - 1.0) * self.raw.dt - DERIVATIVE_HALF_WIDTH;
         // The sample beside a rest shares its differences with it.
         let reach = (wide / self.dt).round().max(1.0) as usize;
-        let near = |k: usize| stands[k.saturating_sub(reach)..(k + reach + 1).min(stands.len())].iter().any(|s| *s);
-        (0..stands.len()).map(|k| !near(k) && !self.pushed_in_part(k)).collect()
+        let near = |k: usize| stands[k.saturating_sub(reach)..(k + reach + 1).min(stands.len())].contains(&true);
+        let pushes = !self.pushed.is_empty();
+        (0..stands.len()).map(|k| !(near(k) || pushes && self.pushed_in_part(k))).collect()
     }
 
     /// Number of signals.

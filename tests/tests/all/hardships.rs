@@ -105,7 +105,6 @@ fn an_effort_without_noise_as_commands_are() {
 }
 
 #[test]
-#[ignore = "fails since springs and play are refined step by step; the cause is not found: issue 23"]
 fn a_clock_that_jitters_and_samples_that_are_lost() {
     told(&logs(3, &with(Sensors { clock_jitter: 2e-4, dropped: 0.02, ..Sensors::default() })), 0.03);
 }

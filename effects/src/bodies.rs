@@ -97,10 +97,11 @@ impl Body {
         let inverse = factor.inverse();
         let log_det = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
         let seen: [Matrix4<f64>; 10] = std::array::from_fn(|i| inverse * self.units[i]);
+        let transposed = seen.map(|seen| seen.transpose());
         Some(Divergence {
             value: x.trace() - log_det,
             gradient: SVector::from_fn(|i, _| self.units[i].trace() - seen[i].trace()),
-            hessian: SMatrix::from_fn(|i, k| (seen[i] * seen[k]).trace()),
+            hessian: SMatrix::from_fn(|i, k| seen[i].dot(&transposed[k])),
         })
     }
 }

@@ -22,12 +22,28 @@ const NODES: [isize; 6] = [-2, -1, 0, 1, 2, 3];
 fn between(x: &[f64], offset: isize, fraction: f64) -> Vec<f64> {
     let others = |i: isize| NODES.into_iter().filter(move |m| *m != i);
     let weight = |i: isize| others(i).map(|m| (fraction - m as f64) / (i - m) as f64).product::<f64>();
-    let weights = NODES.map(weight);
+    convolved(x, offset + NODES[0], &NODES.map(weight))
+}
+
+/// Σ weights\[i\] x\[k + first + i\] of every sample k; ends of the signal go on as they are.
+pub(crate) fn convolved(x: &[f64], first: isize, weights: &[f64]) -> Vec<f64> {
+    /// Sums that are formed side by side.
+    const SIDE_BY_SIDE: usize = 8;
     let Some(last) = x.len().checked_sub(1) else { return Vec::new() };
     let at = |k: isize| x[(k.max(0) as usize).min(last)];
-    (0..x.len())
-        .map(|k| NODES.iter().zip(&weights).map(|(node, weight)| weight * at(k as isize + offset + node)).sum())
-        .collect()
+    let padded = x.len().next_multiple_of(SIDE_BY_SIDE) + weights.len();
+    let padded: Vec<f64> = (0..padded as isize).map(|k| at(k + first)).collect();
+    let mut out = vec![0.0; x.len()];
+    for (block, out) in out.chunks_mut(SIDE_BY_SIDE).enumerate() {
+        let mut sums = [0.0; SIDE_BY_SIDE];
+        for (weight, x) in weights.iter().zip(padded[block * SIDE_BY_SIDE..].array_windows::<SIDE_BY_SIDE>()) {
+            for (sum, x) in sums.iter_mut().zip(x) {
+                *sum += weight * x;
+            }
+        }
+        out.copy_from_slice(&sums[..out.len()]);
+    }
+    out
 }
 
 /// Response of a first-order lag to a signal that is linear between samples, exact; it starts as if the signal had been
@@ -66,8 +82,7 @@ pub(crate) fn smoothed(x: &[f64], half_width: f64, dt: f64) -> Vec<f64> {
     let weight = |i: usize| (0.5 * PI * (i as f64 - reach as f64) * dt / half_width).cos().powi(4);
     let weights: Vec<f64> = (0..=2 * reach).map(weight).collect();
     let sum: f64 = weights.iter().sum();
-    let at = |k: usize| x[k.saturating_sub(reach).min(x.len() - 1)];
-    (0..x.len()).map(|k| weights.iter().enumerate().map(|(i, w)| w * at(k + i)).sum::<f64>() / sum).collect()
+    convolved(x, -(reach as isize), &weights).into_iter().map(|mean| mean / sum).collect()
 }
 
 fn differences(x: &[f64], of: impl Fn(f64, f64, f64) -> f64) -> Vec<f64> {

@@ -1,5 +1,6 @@
 //! A motion with the effort that drove it: what signatures are evaluated on.
 
+use crate::filter::convolved;
 use gapscope_dynamics::Model;
 use statrs::function::erf::erf;
 
@@ -109,14 +110,13 @@ impl Motion<'_> {
             force[if early > 0.0 { k - 1 } else { k }] += early * jump;
         }
         let reach = weights.len() / 2;
-        let place = |k: usize| k.saturating_sub(reach).min(force.len() - 1);
         let turns = |k: usize| {
             // A jump beside the last sample within reach is shared with it.
             let near = &speed[k.saturating_sub(reach + 1)..(k + reach + 2).min(speed.len())];
             near.iter().any(|v| *v >= standstill) && near.iter().any(|v| *v <= -standstill)
         };
-        let mean = |k: usize| weights.iter().enumerate().map(|(i, w)| w * force[place(k + i)]).sum();
-        (0..force.len()).map(|k| if turns(k) { mean(k) } else { force[k] }).collect()
+        let mean = convolved(&force, -(reach as isize), &weights);
+        (0..force.len()).map(|k| if turns(k) { mean[k] } else { force[k] }).collect()
     }
 
     /// Number of samples.

@@ -277,11 +277,13 @@ impl Problem {
     ) {
         let taken: Vec<Vec<Column>> = signals.iter().map(|s| vec![alignment(s, self.joints.len())]).collect();
         self.fill(signals, band, standstill, 0, &taken);
-        for (c, candidate) in changes {
+        let of = |candidate: &Candidate| -> Vec<Vec<Column>> {
+            signals.iter().map(|s| candidate.columns(&s.motion(model, standstill))).collect()
+        };
+        let runs: Vec<Vec<Vec<Column>>> = changes.par_iter().map(|(_, candidate)| of(candidate)).collect();
+        for ((c, candidate), runs) in changes.iter().zip(&runs) {
             let begin = self.entries[*c].columns.start;
-            let runs: Vec<Vec<Column>> =
-                signals.iter().map(|s| candidate.columns(&s.motion(model, standstill))).collect();
-            self.fill(signals, band, standstill, begin, &runs);
+            self.fill(signals, band, standstill, begin, runs);
             for (i, column) in runs[0].iter().enumerate() {
                 self.bounds[begin + i] = (column.at_least, column.at_most);
             }

@@ -10,6 +10,7 @@ use crate::record::band::Band;
 use gapscope_effects::Kind;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Moves of a climb, at most.
 const MOVES: usize = 150;
@@ -53,13 +54,16 @@ pub struct Account<'a> {
     pub set: Vec<usize>,
     /// Log of the probability of logs and set, nats, up to a constant of the logs.
     pub nats: f64,
-    /// The score at the noise that fits the set best.
-    pub(super) score: Score<'a>,
+    /// Noise that fits the set best, (N m)² or N² a joint.
+    noise: Vec<f64>,
+    score: OnceLock<Score<'a>>,
 }
 
 /// The competition on one problem.
 pub struct Competition<'a> {
     problem: &'a Problem,
+    /// The score at the noise that the problem is weighed by.
+    pub(super) score: Score<'a>,
     pub(super) columns: Vec<Range<usize>>,
     /// Of each entry, the number of places and of shapes at a place that its kind has.
     places: Vec<(usize, usize)>,
@@ -106,7 +110,7 @@ impl<'a> Competition<'a> {
             })
             .collect();
         let columns = problem.entries.iter().map(|e| e.columns.clone()).collect();
-        Competition { problem, columns, places }
+        Competition { problem, score: problem.score(), columns, places }
     }
 
     pub(super) fn kind(&self, c: usize) -> Kind {
@@ -137,23 +141,30 @@ impl<'a> Competition<'a> {
     pub fn account(&self, mut set: Vec<usize>, from: &Score<'a>) -> Option<Account<'a>> {
         set.sort_unstable();
         loop {
-            let (score, solved) = from.settle(&self.problem.columns(&set))?;
+            let (noise, solved) = from.settle(&self.problem.columns(&set))?;
             // What has come to nothing is not there.
             let gone = |c: &usize| {
                 let own = &self.columns[*c];
                 !self.kind(*c).card().optional_parts && solved.at_nothing().any(|c| own.contains(&c))
             };
             if !set.iter().any(gone) {
-                return Some(Account { nats: solved.nats + self.prior(&set), set, score });
+                let nats = solved.nats + self.prior(&set);
+                return Some(Account { set, nats, noise, score: OnceLock::new() });
             }
             set.retain(|c| !gone(c));
         }
     }
 
+    /// The score at the noise that fits an account's set best.
+    pub(super) fn score_of<'b>(&self, account: &'b Account<'a>) -> &'b Score<'a> {
+        account.score.get_or_init(|| self.score.at(account.noise.clone()))
+    }
+
     /// A set without the kinds that move no joint by as much as concerns anyone, and in whose stead no other has to be what it
     /// hardly can: a last link could take over any payload, had it no mass of its own.
     fn material(&self, mut set: Vec<usize>) -> Vec<usize> {
-        let Some((score, with)) = self.problem.score().settle(&self.problem.columns(&set)) else { return set };
+        let Some((noise, with)) = self.score.settle(&self.problem.columns(&set)) else { return set };
+        let score = self.score.at(noise);
         let left = score.left_by(&with);
         for kind in kinds(self.problem, &set) {
             let rest = self.without(&set, |c| self.kind(c) == kind);
@@ -182,15 +193,15 @@ impl<'a> Competition<'a> {
     /// Climbs from a set to one whose neighbours are all worse.
     pub fn climb(&self, set: Vec<usize>, forbidden: &[Kind]) -> Option<Account<'a>> {
         let forbidden = &[forbidden, &self.problem.closed].concat();
-        let mut here = self.account(set, &self.problem.score())?;
+        let mut here = self.account(set, &self.score)?;
         let mut wide = false;
         for _ in 0..MOVES {
             let next = if wide { self.far(&here, forbidden) } else { self.near(&here, forbidden) };
             // At its own noise a move may lose what it gains at this one, and gain what it does not: where something large is
             // missed, the noise of its joint is what is missed.
             let rises = |account: &Account<'_>| account.nats > here.nats + RISE;
-            let better =
-                (next.into_iter().take(SHORTLIST)).find_map(|(_, set)| self.account(set, &here.score).filter(rises));
+            let better = (next.into_iter().take(SHORTLIST))
+                .find_map(|(_, set)| self.account(set, self.score_of(&here)).filter(rises));
             match better {
                 Some(better) => {
                     here = better;
@@ -217,7 +228,7 @@ impl<'a> Competition<'a> {
 
     /// Sets with one candidate more or less, best first.
     fn near(&self, here: &Account<'a>, forbidden: &[Kind]) -> Vec<(f64, Vec<usize>)> {
-        let score = &here.score;
+        let score = self.score_of(here);
         let Some(solved) = score.solve(&self.problem.columns(&here.set)) else { return Vec::new() };
         let own: Vec<Range<usize>> = here.set.iter().map(|&c| self.columns[c].clone()).collect();
         let mut moves: Vec<(f64, Vec<usize>)> = score
@@ -270,7 +281,7 @@ impl<'a> Competition<'a> {
 
     /// Sets with a kind more at all its places, or a kind or a candidate beyond calibration less or exchanged, best first.
     fn far(&self, here: &Account<'a>, forbidden: &[Kind]) -> Vec<(f64, Vec<usize>)> {
-        let (set, score) = (&here.set, &here.score);
+        let (set, score) = (&here.set, self.score_of(here));
         let mut moves: Vec<Vec<usize>> = Vec::new();
         let all: Vec<usize> = (0..self.columns.len()).collect();
         for kind in kinds(self.problem, &all).into_iter().filter(|kind| !forbidden.contains(kind) && !kind.is_outside())

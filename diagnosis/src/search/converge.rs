@@ -72,8 +72,8 @@ impl Record<'_> {
         let data = Data { signals: &loaded, ..data };
         let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind.card().reads_found;
         let under_load = all.entries.iter().enumerate().filter(of_load).map(|(c, e)| (c, e.candidate.clone()));
-        let rigid = |(_, e): &(&usize, &Entry)| !e.candidate.turns();
-        let found = choice.set.iter().zip(&exact.entries).filter(rigid).map(|(&c, e)| (c, e.candidate.clone()));
+        let changed = |(c, e): &(&usize, &Entry)| !e.candidate.turns() && e.candidate != all.entries[**c].candidate;
+        let found = choice.set.iter().zip(&exact.entries).filter(changed).map(|(&c, e)| (c, e.candidate.clone()));
         let changes: Vec<(usize, Candidate)> = under_load.chain(found).collect();
         all.replace(self.model, &loaded, &self.band, &self.still, &changes);
         let at: Vec<usize> = (0..exact.entries.len()).collect();

@@ -44,7 +44,7 @@ impl Competition<'_> {
 /// For each kind that was chosen, the best set without it.
 pub fn rivals(problem: &Problem, chosen: &Choice) -> Vec<Rival> {
     let competition = Competition::new(problem);
-    let Some(best) = competition.account(chosen.set.clone(), &problem.score()) else { return Vec::new() };
+    let Some(best) = competition.account(chosen.set.clone(), &competition.score) else { return Vec::new() };
     kinds(problem, &chosen.set)
         .into_par_iter()
         .filter(|kind| !kind.is_outside())
@@ -63,20 +63,21 @@ pub fn rivals(problem: &Problem, chosen: &Choice) -> Vec<Rival> {
 pub fn swap(problem: &Problem, chosen: &Choice, gone: usize) -> Option<Rival> {
     let competition = Competition::new(problem);
     let without = competition.kind(gone);
-    let best = competition.account(chosen.set.clone(), &problem.score())?;
+    let best = competition.account(chosen.set.clone(), &competition.score)?;
+    let score = competition.score_of(&best);
     let base = competition.without(&chosen.set, |c| c == gone);
-    let solve = |set: &[usize]| best.score.solve(&problem.columns(set));
+    let solve = |set: &[usize]| score.solve(&problem.columns(set));
     let (own, missing) = (solve(&best.set)?, solve(&base)?);
     if own.likeliest() - missing.likeliest() < PRICE_OF_ODD.get() {
         return None;
     }
     let other = |c: usize| competition.kind(c) != without && !competition.kind(c).is_outside();
-    let additions = competition.additions(&best.score, &base, &missing, &problem.closed, &other);
+    let additions = competition.additions(score, &base, &missing, &problem.closed, &other);
     let left = |set: &[usize]| solve(set).map_or(f64::NEG_INFINITY, |solved| solved.likeliest());
     let (nats, set) =
         (additions.into_iter().take(SHORTLIST)).map(|(_, set)| (left(&set), set)).max_by(|a, b| a.0.total_cmp(&b.0))?;
     let by_logs = own.likeliest() - nats;
-    let rival = competition.account(set, &best.score)?;
+    let rival = competition.account(set, score)?;
     Some(Rival { by_logs, ..competition.rival(without, &best, rival) })
 }
 
@@ -84,8 +85,9 @@ pub fn swap(problem: &Problem, chosen: &Choice, gone: usize) -> Option<Rival> {
 /// how many nats it misses one.
 pub fn denied(problem: &Problem, chosen: &Choice) -> Vec<(usize, f64)> {
     let competition = Competition::new(problem);
-    let Some(best) = competition.account(chosen.set.clone(), &problem.score()) else { return Vec::new() };
-    let Some(solved) = best.score.solve(&problem.columns(&best.set)) else { return Vec::new() };
+    let Some(best) = competition.account(chosen.set.clone(), &competition.score) else { return Vec::new() };
+    let score = competition.score_of(&best);
+    let Some(solved) = score.solve(&problem.columns(&best.set)) else { return Vec::new() };
     let present = kinds(problem, &chosen.set);
     let all: Vec<usize> = (0..problem.entries.len()).collect();
     let open: Vec<Kind> =
@@ -94,12 +96,12 @@ pub fn denied(problem: &Problem, chosen: &Choice) -> Vec<(usize, f64)> {
         .filter_map(|kind| {
             let own: Vec<usize> = all.iter().copied().filter(|&c| competition.kind(c) == kind).collect();
             let columns: Vec<Range<usize>> = own.iter().map(|&c| competition.columns[c].clone()).collect();
-            let gains = best.score.gains(&solved, &columns);
+            let gains = score.gains(&solved, &columns);
             let gain = |i: &usize| {
                 gains[*i] - (competition.prior(&best.set) - competition.prior(&competition.with(&best.set, own[*i])))
             };
             let nearest = (0..own.len()).max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
-            let with = best.score.solve(&problem.columns(&competition.with(&best.set, own[nearest])))?;
+            let with = score.solve(&problem.columns(&competition.with(&best.set, own[nearest])))?;
             let nats = with.nats + competition.prior(&competition.with(&best.set, own[nearest]));
             Some((own[nearest], (nats - best.nats).min(0.0)))
         })

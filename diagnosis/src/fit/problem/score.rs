@@ -136,12 +136,19 @@ impl<'a> Score<'a> {
             next.level -= 0.5 * normal.rows / problem.correlation[j] * next.noise[j].ln();
             let columns: Vec<(usize, usize)> =
                 problem.joints[j].columns.iter().copied().enumerate().filter(|(_, c)| wanted(*c)).collect();
-            for &(a, ca) in &columns {
+            for (i, &(a, ca)) in columns.iter().enumerate() {
                 let own = unit * self.spread[ca];
                 next.moment[ca] += own * normal.moment[a];
-                for &(b, cb) in &columns {
+                // Columns ascend, so that this is the half below the diagonal.
+                for &(b, cb) in &columns[i..] {
                     next.gram[(cb, ca)] += own * self.spread[cb] * normal.gram[(b, a)];
                 }
+            }
+        }
+        let used: Vec<usize> = (0..p).filter(|c| wanted(*c)).collect();
+        for (i, &a) in used.iter().enumerate() {
+            for &b in &used[i + 1..] {
+                next.gram[(a, b)] = next.gram[(b, a)];
             }
         }
         next
@@ -160,8 +167,8 @@ impl<'a> Score<'a> {
         }
     }
 
-    /// The score at the noise that fits a set best (expectation maximisation), and the set solved there.
-    pub fn settle(&self, columns: &[usize]) -> Option<(Score<'a>, Solved)> {
+    /// The noise that fits a set best (expectation maximisation), (N m)² or N² a joint, and the set solved there.
+    pub fn settle(&self, columns: &[usize]) -> Option<(Vec<f64>, Solved)> {
         let mut own = vec![false; self.spread.len()];
         columns.iter().for_each(|&c| own[c] = true);
         let mut noise = self.noise.clone();
@@ -175,7 +182,7 @@ impl<'a> Score<'a> {
                 break;
             }
         }
-        Some((self.at(noise), solved))
+        Some((noise, solved))
     }
 
     /// Mean square that a solved set leaves of each joint, what its coefficients may still be off by included.
@@ -193,23 +200,24 @@ impl<'a> Score<'a> {
             .enumerate()
             .map(|(j, normal)| {
                 let columns = &problem.joints[j].columns;
-                let used: Vec<(usize, usize)> = columns
-                    .iter()
-                    .copied()
-                    .enumerate()
-                    .filter(|(_, c)| theta[*c] != 0.0 || place[*c] < usize::MAX)
+                let own = || columns.iter().copied().enumerate();
+                let shifted: Vec<(usize, f64)> =
+                    own().map(|(at, c)| (at, theta[c])).filter(|(_, t)| *t != 0.0).collect();
+                let open: Vec<(usize, usize, f64)> = own()
+                    .map(|(at, c)| (at, place[c], self.spread[c]))
+                    .filter(|(_, place, _)| *place < usize::MAX)
                     .collect();
                 let mut sum = normal.square;
-                for &(a, ca) in &used {
-                    let mut pull = -2.0 * normal.moment[a];
-                    for &(b, cb) in &used {
-                        pull += normal.gram[(b, a)] * theta[cb];
-                        if place[ca] < usize::MAX && place[cb] < usize::MAX {
-                            let spread = self.spread[ca] * self.spread[cb];
-                            sum += normal.gram[(b, a)] * covariance[(place[cb], place[ca])] * spread;
-                        }
-                    }
-                    sum += theta[ca] * pull;
+                for &(a, theta) in &shifted {
+                    let pull: f64 = shifted.iter().map(|&(b, other)| normal.gram[(b, a)] * other).sum();
+                    sum += theta * (pull - 2.0 * normal.moment[a]);
+                }
+                for (i, &(a, place, spread)) in open.iter().enumerate() {
+                    let cross: f64 = open[i + 1..]
+                        .iter()
+                        .map(|&(b, other, spread)| normal.gram[(b, a)] * covariance[(other, place)] * spread)
+                        .sum();
+                    sum += spread * (normal.gram[(a, a)] * covariance[(place, place)] * spread + 2.0 * cross);
                 }
                 (sum.max(0.0) / normal.rows.max(1.0)).max(problem.least_noise(j))
             })

@@ -22,7 +22,7 @@ mod outside;
 mod plant;
 mod wind_up;
 
-pub use bodies::{Body, Divergence, keep_bodies};
+pub use bodies::{Body, Divergence, keep_bodies, leave_to_link};
 pub use candidate::{Candidate, EncoderSide, Range};
 pub use card::{Apart, Axis, Card, Force, Gauge, Grid, Knob, Late, Part, Place, Pushes, Rests, Size, Turned, Turning};
 pub use catalogue::*;

@@ -6,7 +6,8 @@ use crate::schema::{Change, Estimate, FoundEffect, Parameter, Quantity, Verdict}
 use gapscope_dynamics::{Joint, JointKind, Model};
 use gapscope_effects::Effect;
 
-/// A link keeps at least this part of the mass that its description has: those of used robots are off by a third at most.
+/// A link by itself keeps at least this part of the mass that its description has: those of used robots are off by a third at
+/// most. A tool that is missing may be heavier than its link, so that a load may leave next to nothing.
 const LIGHTEST: f64 = 1.0 / 3.0;
 /// Play beyond this is none that a drive has, rad and m: its teeth would not mesh.
 const MOST_PLAY: [f64; 2] = [1.0, 0.1];
@@ -64,11 +65,13 @@ fn impossible(effect: &FoundEffect, model: &Model) -> Option<String> {
     for (parameter, value) in &effect.parameters {
         for (name, value, most) in scalars(value, &effect.joints) {
             let Some(of) = joint(name) else { continue };
-            let lightest = -(1.0 - LIGHTEST) * of.inertia.mass;
             match parameter.as_str() {
                 // Of a link whose mass the logs do not determine, they do not say that it is too light.
-                "mass" | "mass_delta" if most < lightest => {
+                "mass_delta" if most < -(1.0 - LIGHTEST) * of.inertia.mass => {
                     return Some(format!("the link of {name} would keep less than a third of its mass"));
+                }
+                "mass" if most < -of.inertia.mass => {
+                    return Some(format!("the link of {name} would be lighter than nothing"));
                 }
                 "mass" if robot > 0.0 && value > robot => {
                     return Some(format!("{value:.3} kg is more than the robot's own {robot:.3} kg"));
@@ -137,7 +140,8 @@ mod tests {
         let limit = first.limits.effort.unwrap();
         let cases = [
             ("payload", "mass", last, 0.2 * robot, 1.1 * robot, true),
-            ("payload", "mass", last, -0.6 * last.inertia.mass, -0.7 * last.inertia.mass, true),
+            ("payload", "mass", last, -0.9 * last.inertia.mass, -1.1 * last.inertia.mass, true),
+            ("link_inertia_error", "mass_delta", last, -0.6 * last.inertia.mass, -0.7 * last.inertia.mass, true),
             ("link_inertia_error", "mass_delta", first, 2.0 * robot, -1.01 * first.inertia.mass, true),
             ("coulomb_friction", "coulomb", first, 0.9 * limit, 1.1 * limit, false),
             ("backlash", "gap", first, 0.1, 1.1, false),

@@ -5,7 +5,7 @@ use crate::record::band::Band;
 use crate::record::signals::Signals;
 use crate::schema::{Estimate, Parameter, Quantity};
 use gapscope_dynamics::{JointKind, Model};
-use gapscope_effects::{Candidate, Effect, Kind, Plant, Value, keep_bodies};
+use gapscope_effects::{Candidate, Effect, Kind, Plant, Value, keep_bodies, leave_to_link};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -145,6 +145,14 @@ impl Fit {
     pub fn effects(&self, problem: &Problem, model: &Model) -> Vec<Effect> {
         let mut effects: Vec<Effect> =
             self.effects_with_candidates(problem, model).into_iter().map(|(effect, _)| effect).collect();
+        let loads = |c: &&usize| {
+            let kind = problem.entries[**c].candidate.kind;
+            kind.card().body && !kind.is_calibration()
+        };
+        for &c in self.set.iter().filter(loads) {
+            let (_, theta) = self.own(problem, c);
+            leave_to_link(&theta, &problem.entries[c].effects(model, &theta, self.without), &mut effects);
+        }
         if Plant::new(model, &effects, 1e-3).is_err() {
             keep_bodies(model, &mut effects);
         }

@@ -71,7 +71,7 @@ pub(crate) fn split(table: Table, name: &str) -> (Vec<Episode>, Vec<String>) {
     (parts, notes)
 }
 
-/// Puts parts on the steady clocks by which they were sampled, where their stamps jitter; says so where there are any.
+/// Puts parts on the steady clocks by which they were sampled, where their stamps jitter; says so where that is worth a word.
 fn steadied(parts: &mut [Episode]) -> Option<String> {
     let mut most: Option<f64> = None;
     for part in parts {
@@ -81,7 +81,7 @@ fn steadied(parts: &mut [Episode]) -> Option<String> {
             part.time = time;
         }
     }
-    most.map(|most| {
+    most.filter(|most| *most > JITTER).map(|most| {
         format!(
             "time stamps jitter by up to {:.0} % of a step, and the positions are smooth without that: read as sampled at a steady rate",
             100.0 * most
@@ -167,6 +167,18 @@ mod tests {
         let (parts, notes) = split(table(time), "run.csv");
         assert_eq!(parts.len(), 1);
         assert!(notes[0].contains("lost"), "{notes:?}");
+    }
+
+    #[test]
+    fn stamps_that_jitter_about_a_steady_clock_are_put_on_it_and_that_is_told() {
+        let stamps: Vec<f64> =
+            even(400, 0.0).into_iter().enumerate().map(|(k, t)| t + 0.002 * f64::from(u8::from(k % 7 == 3))).collect();
+        let mut table = table(stamps);
+        table.episode.position = vec![even(400, 0.0).iter().map(|t| (2.0 * t).sin()).collect()];
+        let (parts, notes) = split(table, "run.csv");
+        assert!(notes.len() == 1 && notes[0].contains("jitter by up to 1") && notes[0].contains("steady"), "{notes:?}");
+        let steps: Vec<f64> = parts[0].time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(steps.iter().all(|step| (step - 0.01).abs() < 1e-5), "{steps:?}");
     }
 
     #[test]

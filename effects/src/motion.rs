@@ -3,6 +3,7 @@
 use crate::filter::convolved;
 use gapscope_dynamics::Model;
 use statrs::function::erf::erf;
+use std::borrow::Cow;
 
 /// Joint signals of one continuous run on a uniform grid, joint-major: `q[j][k]` is joint j at sample k.
 ///
@@ -117,6 +118,17 @@ impl Motion<'_> {
         };
         let mean = convolved(&force, -(reach as isize), &weights);
         (0..force.len()).map(|k| if turns(k) { mean[k] } else { force[k] }).collect()
+    }
+
+    /// The robot as described, under the gravity that was found: what a link is off by shows under that one. A first moment
+    /// about an upright axis shows where the base is tilted, and nowhere else.
+    pub fn described(&self) -> Cow<'_, Model> {
+        let gravity = self.bodies.gravity();
+        if gravity == self.model.gravity() {
+            Cow::Borrowed(self.model)
+        } else {
+            Cow::Owned(self.model.clone().with_gravity(gravity))
+        }
     }
 
     /// Number of samples.

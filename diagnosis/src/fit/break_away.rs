@@ -68,7 +68,7 @@ mod tests {
     fn friction_rises_towards_rest_where_it_does_so_beyond_doubt() {
         let sticking = Candidate { shape: 0.2, ..Candidate::new(Kind::StribeckFriction, vec![0]) };
         let rises = |law: fn(f64) -> f64| {
-            let (signals, band, problem, fit) = fitted_as(sticking.clone(), torque(law));
+            let (signals, band, problem, fit) = fitted_as(vec![sticking.clone()], torque(law));
             let model = gapscope_dynamics::robots::model("double_pendulum").unwrap().unwrap().model;
             fit.rises(&problem, &model, 0, &speeds(&signals, &band, 2))
         };

@@ -347,7 +347,7 @@ fn insert(parameters: &mut BTreeMap<String, Parameter>, model: &Model, value: &V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::support::{fitted, torque};
+    use crate::fit::support::{fitted, fitted_as, torque};
 
     /// A drag that grows with the square of the speed, fitted as one that grows with it, is too weak at any high speed and too
     /// strong at any low one: in every block of time the two are nearly even, and only parts of the speed tell.
@@ -371,5 +371,26 @@ mod tests {
             panic!("one number")
         };
         assert!(0.5 * (high - low) > 1.96 * over_speed.sqrt(), "{low} to {high}");
+    }
+    /// Half a kilogram whose second moments are less than nothing along one axis, there or missing.
+    #[test]
+    fn a_load_and_the_error_of_its_link_add_up_to_what_was_fitted() {
+        let model = gapscope_dynamics::robots::model("double_pendulum").unwrap().unwrap().model;
+        let candidates = [Kind::LinkInertiaError, Kind::Payload].map(|kind| Candidate::new(kind, vec![1]));
+        let (_, _, problem, mut fit) = fitted_as(candidates.to_vec(), torque(|_| 0.0));
+        let link = model.joints()[1].inertia;
+        for sign in [1.0, -1.0] {
+            let load = [0.5, 0.0, 0.01, 0.03, 0.004, 0.0, 0.004, 0.0, 0.0, 0.006].map(|x| 0.2 * sign * link.mass * x);
+            let error = link.parameters().map(|x| 0.1 * x);
+            for (c, own) in [(0, error), (1, load)] {
+                let (at, _) = fit.own(&problem, c);
+                at.into_iter().zip(own).for_each(|(at, own)| fit.theta[at] = own);
+            }
+            let plant = Plant::new(&model, &fit.effects(&problem, &model), 1e-3).unwrap();
+            let whole = plant.model().joints()[1].inertia.parameters();
+            for (i, nominal) in link.parameters().into_iter().enumerate() {
+                assert!((whole[i] - nominal - error[i] - load[i]).abs() < 1e-9, "{sign} {i}");
+            }
+        }
     }
 }

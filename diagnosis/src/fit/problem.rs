@@ -47,6 +47,8 @@ pub struct Problem {
     pub bounds: Vec<(f64, f64)>,
     /// Kinds that no climb brings in.
     pub closed: Vec<Kind>,
+    /// Gravity under which the columns of bodies stand, m/s² in the frame of the base.
+    pub gravity: [f64; 3],
     /// Precision that each coefficient has before any log is seen, 1 over the square of its unit: 0 where any size is plausible.
     prior: Vec<f64>,
     /// Time between two samples of the fastest log, s.
@@ -88,7 +90,11 @@ impl Problem {
         let terms: Vec<Term> = terms.into_iter().filter(|t| t.candidate.joints.iter().all(|&j| moving[j])).collect();
         let sample = signals.iter().map(|s| s.raw.dt).fold(f64::INFINITY, f64::min);
         let half_sample = 0.5 * sample;
-        let known_of = |term: &Term| known.of(&term.candidate).filter(|_| term.tangent_at.is_none());
+        let nominal = model.gravity().to_array();
+        let gravity = signals.first().map_or(nominal, |s| s.gravity(model));
+        let weighs_otherwise = |term: &Term| term.candidate.kind.card().body && gravity != nominal;
+        let stays = |term: &Term| term.tangent_at.is_none() && !weighs_otherwise(term);
+        let known_of = |term: &Term| known.of(&term.candidate).filter(|_| stays(term));
         let mut entries = Vec::new();
         let mut bounds = vec![(-half_sample, half_sample)];
         // Anywhere within half a sample, each place alike.
@@ -180,6 +186,7 @@ impl Problem {
             entries,
             bounds,
             closed: Vec::new(),
+            gravity,
             prior,
             sample,
             scale,
@@ -267,6 +274,7 @@ impl Problem {
     }
 
     /// Puts other candidates of the same kinds and joints in the places of some entries, and reads anew what the alignment does.
+    /// Where another gravity was found, all bodies are to be among them.
     pub fn replace(
         &mut self,
         model: &Model,
@@ -289,6 +297,7 @@ impl Problem {
             }
             self.entries[*c].candidate = candidate.clone();
         }
+        self.gravity = signals.first().map_or(self.gravity, |s| s.gravity(model));
         self.accumulate(band);
     }
 

@@ -12,11 +12,11 @@ use gapscope_effects::{Candidate, Kind};
 
 /// A kind fitted to the first joint of a double pendulum, of logs to which something is done.
 pub(crate) fn fitted(kind: Kind, done: impl Fn(&mut Signals)) -> (Vec<Signals>, Band, Problem, Fit) {
-    fitted_as(Candidate::new(kind, vec![0]), done)
+    fitted_as(vec![Candidate::new(kind, vec![0])], done)
 }
 
-/// The same with one candidate.
-pub(crate) fn fitted_as(candidate: Candidate, done: impl Fn(&mut Signals)) -> (Vec<Signals>, Band, Problem, Fit) {
+/// The same of some candidates.
+pub(crate) fn fitted_as(candidates: Vec<Candidate>, done: impl Fn(&mut Signals)) -> (Vec<Signals>, Band, Problem, Fit) {
     let model = robots::model("double_pendulum").unwrap().unwrap().model;
     let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
     let signals: Vec<Signals> = (1..4)
@@ -36,10 +36,11 @@ pub(crate) fn fitted_as(candidate: Candidate, done: impl Fn(&mut Signals)) -> (V
         noise: &[1e-3; 2],
         known: &crate::record::known::Known::default(),
     };
-    let term = Term { candidate, tangent_at: None };
-    let mut problem = data.problem(vec![term], &Kind::ALL);
+    let terms: Vec<Term> = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
+    let all: Vec<usize> = (0..terms.len()).collect();
+    let mut problem = data.problem(terms, &Kind::ALL);
     problem.split(&band);
-    let fit = Fit::on_all(&problem, &[0]);
+    let fit = Fit::on_all(&problem, &all);
     (signals, band, problem, fit)
 }
 

@@ -185,6 +185,11 @@ impl Signals {
         (0..stands.len()).map(|k| !(near(k) || pushes && self.pushed_in_part(k))).collect()
     }
 
+    /// Gravity as it was found, m/s² in the frame of the base; the model's where nothing is known of it.
+    pub fn gravity(&self, model: &Model) -> [f64; 3] {
+        self.bodies.as_deref().unwrap_or(model).gravity().to_array()
+    }
+
     /// Number of signals.
     pub fn len(&self) -> usize {
         self.q.first().map_or(0, Vec::len)

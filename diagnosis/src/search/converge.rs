@@ -70,7 +70,11 @@ impl Record<'_> {
         // Gears are loaded by what was found as well, be it only a rotor or a spring in a joint that carries little.
         let loaded = data.loaded(exact, fit)?;
         let data = Data { signals: &loaded, ..data };
-        let of_load = |(_, e): &(usize, &Entry)| e.candidate.kind.card().reads_found;
+        let weighs_otherwise = loaded.first().is_some_and(|s| s.gravity(self.model) != all.gravity);
+        let of_load = |(_, e): &(usize, &Entry)| {
+            let card = e.candidate.kind.card();
+            card.reads_found || weighs_otherwise && card.body
+        };
         let under_load = all.entries.iter().enumerate().filter(of_load).map(|(c, e)| (c, e.candidate.clone()));
         let changed = |(c, e): &(&usize, &Entry)| !e.candidate.turns() && e.candidate != all.entries[**c].candidate;
         let found = choice.set.iter().zip(&exact.entries).filter(changed).map(|(&c, e)| (c, e.candidate.clone()));

@@ -107,18 +107,19 @@ impl Listed for Payload {
 
 /// Ten columns: the regressor of the link. Coefficients: m, m c (3), inertia about the link's origin (xx, xy, yy, xz, yz, zz).
 pub(super) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
-    let n = motion.model.dof();
-    let mut data = Data::new(motion.model);
+    let model = motion.described();
+    let n = model.dof();
+    let mut data = Data::new(&model);
     let mut regressor = DMatrix::zeros(n, 10 * n);
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     // A body loads the joints between it and the base.
-    let mut bearing: Vec<usize> = std::iter::successors(Some(joint), |&j| motion.model.joints()[j].parent).collect();
+    let mut bearing: Vec<usize> = std::iter::successors(Some(joint), |&j| model.joints()[j].parent).collect();
     bearing.reverse();
     let mut columns: Vec<Column> = (0..10)
         .map(|i| Column {
             rows: bearing.iter().map(|&j| (j, Vec::with_capacity(motion.len()))).collect(),
             // A body may be missing, but not more than the link has.
-            at_least: if i == 0 { -motion.model.joints()[joint].inertia.mass } else { f64::NEG_INFINITY },
+            at_least: if i == 0 { -model.joints()[joint].inertia.mass } else { f64::NEG_INFINITY },
             at_most: f64::INFINITY,
         })
         .collect();
@@ -126,7 +127,7 @@ pub(super) fn signature(motion: &Motion, joint: usize) -> Vec<Column> {
         for j in 0..n {
             (q[j], v[j], a[j]) = (motion.q[j][k], motion.v[j][k], motion.a[j][k]);
         }
-        motion.model.regressor(&mut data, &q, &v, &a, &mut regressor);
+        model.regressor(&mut data, &q, &v, &a, &mut regressor);
         for (i, column) in columns.iter_mut().enumerate() {
             for (j, row) in &mut column.rows {
                 row.push(regressor[(*j, 10 * joint + i)]);

@@ -18,10 +18,7 @@ const SETTLED: f64 = 1e-6;
 const FROM_OUTSIDE: i32 = 6;
 
 /// A link, and where among some columns stand the ten numbers that add to it, an error and what it carries.
-#[derive(PartialEq)]
 struct Link<'a> {
-    /// Its place in the model.
-    link: usize,
     body: &'a Body,
     at: Vec<usize>,
 }
@@ -42,34 +39,13 @@ impl Problem {
         held: &mut [Option<f64>],
         theta: Vec<f64>,
     ) -> Vec<f64> {
-        let mut here = DVector::from_vec(theta);
-        let mut links = self.links(columns, here.as_slice(), &[]);
-        loop {
-            here = self.embodied(columns, gram, moment, held, here, &links);
-            // Bodies may have made a load one that is missing.
-            let next = self.links(columns, here.as_slice(), &links);
-            if next == links {
-                return here.iter().copied().collect();
-            }
-            links = next;
-        }
-    }
-
-    /// The same for some links, from a place where they may be no bodies.
-    fn embodied(
-        &self,
-        columns: &[usize],
-        gram: &DMatrix<f64>,
-        moment: &DVector<f64>,
-        held: &mut [Option<f64>],
-        mut here: DVector<f64>,
-        links: &[Link<'_>],
-    ) -> DVector<f64> {
+        let links = self.links(columns, &theta);
         if links.is_empty() {
-            return here;
+            return theta;
         }
+        let mut here = DVector::from_vec(theta);
         let mut outside = false;
-        for link in links {
+        for link in &links {
             // Towards the URDF until it is a body.
             while link.body.divergence(&link.more(&here)).is_none() {
                 link.at.iter().for_each(|&at| (at..at + 10).for_each(|i| here[i] *= 0.5));
@@ -79,9 +55,9 @@ impl Problem {
         // From beyond the edge of what a body can be, the way leads through its middle: at the edge, every step is cut short.
         let first = if outside { FROM_OUTSIDE } else { 0 };
         for tenfold in (0..=first).rev() {
-            here = self.settle(columns, gram, moment, held, here, links, BODIES_PULL * 10f64.powi(tenfold));
+            here = self.settle(columns, gram, moment, held, here, &links, BODIES_PULL * 10f64.powi(tenfold));
         }
-        here
+        here.iter().copied().collect()
     }
 
     /// The least of deviance and `pull` times the divergence of links, by Newton's method from a place where they are bodies.
@@ -135,18 +111,17 @@ impl Problem {
     }
 
     /// The links that some columns add to. A load that is there is a body of its own and no part of its link; one that is
-    /// missing, or was when these links were told `before`, leaves the link that it is missing from.
-    fn links(&self, columns: &[usize], theta: &[f64], before: &[Link<'_>]) -> Vec<Link<'_>> {
+    /// missing leaves the link that it is missing from.
+    fn links(&self, columns: &[usize], theta: &[f64]) -> Vec<Link<'_>> {
         let mut links: Vec<Link> = Vec::new();
         for (link, body) in self.bodies.iter().enumerate().filter_map(|(link, body)| Some((link, body.as_ref()?))) {
             let adds = |e: &&super::Entry| e.candidate.link() == Some(link);
             let place = |e: &super::Entry| columns.iter().position(|c| *c == e.columns.start);
-            let was = |at: usize| before.iter().any(|before| before.link == link && before.at.contains(&at));
-            let missing = |e: &super::Entry, at: usize| e.candidate.kind.is_calibration() || theta[at] < 0.0 || was(at);
+            let missing = |e: &super::Entry, at: usize| e.candidate.kind.is_calibration() || theta[at] < 0.0;
             let at: Vec<usize> =
                 self.entries.iter().filter(adds).filter_map(|e| place(e).filter(|&at| missing(e, at))).collect();
             if !at.is_empty() {
-                links.push(Link { link, body, at });
+                links.push(Link { body, at });
             }
         }
         links

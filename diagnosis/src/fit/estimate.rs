@@ -372,6 +372,7 @@ mod tests {
         };
         assert!(0.5 * (high - low) > 1.96 * over_speed.sqrt(), "{low} to {high}");
     }
+
     /// Half a kilogram whose second moments are less than nothing along one axis, there or missing.
     #[test]
     fn a_load_and_the_error_of_its_link_add_up_to_what_was_fitted() {

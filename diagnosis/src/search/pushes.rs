@@ -55,6 +55,8 @@ impl Record<'_> {
             pushed = contact::of_one_force(&self.signals, &self.band, &left, &always, &pushes);
             self.contacts = contacts;
         }
+        // A run with more noise is pushed as the run was.
+        self.noisier.iter_mut().zip(&self.signals).for_each(|(noisier, s)| noisier.pushed.clone_from(&s.pushed));
         Ok(())
     }
 
@@ -111,5 +113,31 @@ impl Record<'_> {
             contact.force = force.copied().unwrap_or(contact.force);
         }
         Beside { left: Left::new(rest, &still, &holds), always, contacts }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gapscope_datasets::{Recipe, generate};
+    use gapscope_dynamics::robots;
+    use gapscope_effects::{Effect, ExternalContact};
+
+    /// What an account makes of noise is told by a second run: one without its pushes would make all of them noise.
+    #[test]
+    fn the_runs_with_more_noise_are_pushed_as_the_logs_are() {
+        let model = robots::model("arm6").unwrap().unwrap().model;
+        let push = ExternalContact {
+            link: model.joints()[5].link.clone(),
+            intervals: vec![[2.0, 3.0], [5.0, 6.5]],
+            force: [15.0, -10.0, 20.0],
+            ..ExternalContact::default()
+        };
+        let recipe = Recipe { seconds: 10.0, rate: 250.0, ..Recipe::default() };
+        let log = generate(&model, &[Effect::ExternalContact(push)], 1, &recipe, "log").unwrap();
+        let mut record = Record::new(&model, &[log], &mut Vec::new());
+        record.look_for_pushes().unwrap();
+        assert_eq!(record.signals[0].pushed.len(), 2, "{:?}", record.signals[0].pushed);
+        assert_eq!(record.noisier[0].pushed, record.signals[0].pushed);
     }
 }

@@ -21,9 +21,9 @@ pub struct ExternalContact {
     pub link: String,
     /// From and to, s since the start of the episode.
     pub intervals: Vec<[f64; 2]>,
-    /// N, in the world frame, at the link's centre of mass.
+    /// N, in the world frame.
     pub force: [f64; 3],
-    /// Where the force acts, m from the centre of mass of the model's link, along the axes of the link's frame.
+    /// Where the force acts, m from the centre of mass of the link as the model describes it, along the axes of the link's frame.
     #[serde(default, skip_serializing_if = "is_nothing")]
     pub offset: [f64; 3],
 }
@@ -66,11 +66,10 @@ impl Law for ExternalContact {
         }
         let named = plant.model().joints().iter().position(|joint| joint.link == self.link);
         let link = named.map_or_else(|| plant.joint(self.kind(), &self.link), Ok)?;
-        let center = plant.model().joints()[link].inertia.center_of_mass().unwrap_or_default();
         plant.contacts.push(Contact {
             link,
             force: DVec3::from_array(self.force),
-            point: center + DVec3::from_array(self.offset),
+            point: plant.centers[link] + DVec3::from_array(self.offset),
             intervals: self.intervals.clone(),
         });
         Ok(())

@@ -58,6 +58,9 @@ pub struct Plant {
     pub(crate) offset: Vec<f64>,
     pub(crate) ripples: Vec<Ripple>,
     pub(crate) contacts: Vec<Contact>,
+    /// Where a force on each link acts: the centre of mass that its description has, m, in the link's frame. That of what was
+    /// found of a link may lie anywhere where logs show no mass.
+    pub(crate) centers: Vec<DVec3>,
     pub(crate) bristles: Vec<Bristle>,
     /// Whether friction changes with time.
     pub(crate) drifts: bool,
@@ -147,6 +150,7 @@ impl Plant {
             offset: vec![0.0; n],
             ripples: Vec::new(),
             contacts: Vec::new(),
+            centers: model.joints().iter().map(|j| j.inertia.center_of_mass().unwrap_or_default()).collect(),
             bristles: Vec::new(),
             drifts: false,
             directions: Vec::new(),

@@ -5,8 +5,8 @@ use crate::{common, support};
 use common::robot;
 use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{
-    Candidate, CoulombFriction, Effect, EncoderSide, JointZeroOffset, Kind, LoadDependentFriction, Motion, Payload,
-    Plant, Range,
+    Candidate, CoulombFriction, Effect, EncoderSide, JointZeroOffset, Kind, LinkInertiaError, LoadDependentFriction,
+    Motion, Payload, Plant, Range,
 };
 use support::motion;
 
@@ -166,6 +166,44 @@ fn the_column_of_an_offset_is_that_of_the_bodies_that_were_found() {
     };
     assert!(off(&found) < 1e-3, "{}", off(&found));
     assert!(off(&model) > 0.2, "{}", off(&model));
+}
+
+/// Where logs show next to no mass of a link, what was found has its centre of mass anywhere: the push stays where it was.
+#[test]
+fn a_push_acts_where_the_described_link_has_its_centre_whatever_was_found_of_the_link() {
+    let model = robot("arm6");
+    let joint = &model.joints()[5];
+    let light = Effect::LinkInertiaError(LinkInertiaError {
+        joint: joint.name.clone(),
+        mass_delta: -0.99 * joint.inertia.mass,
+        first_moment_delta: [0.0; 3],
+        inertia_delta: [0.0; 6],
+    });
+    let run = Run::new(&model);
+    let motion = run.motion(&model);
+    let (candidate, force) = (Candidate::new(Kind::ExternalContact, vec![5]), [5.0, -3.0, 8.0]);
+    let Some(Effect::ExternalContact(mut push)) = candidate.effects(&model, &force).pop() else { unreachable!() };
+    push.intervals = motion.pushed.to_vec();
+    let push = Effect::ExternalContact(push);
+    let columns = candidate.columns(&motion);
+    let residuals = |effects: &[Effect]| Plant::new(&model, effects, DT).unwrap().residuals(&motion);
+    let without = residuals(std::slice::from_ref(&light));
+    for effects in [[light.clone(), push.clone()], [push, light]] {
+        let with = residuals(&effects);
+        let (mut worst, mut largest) = (0.0f64, 0.0f64);
+        for j in 0..model.dof() {
+            // Away from where the push begins and ends.
+            for k in (0..SAMPLES).filter(|k| [250, 750].iter().all(|edge: &usize| k.abs_diff(*edge) > 2)) {
+                let of = |(c, t): (&gapscope_effects::Column, &f64)| {
+                    c.rows.iter().filter(|(row, _)| *row == j).map(|(_, x)| t * x[k]).sum::<f64>()
+                };
+                let told: f64 = columns.iter().zip(&force).map(of).sum();
+                worst = worst.max((without[j][k] - with[j][k] - told).abs());
+                largest = largest.max(told.abs());
+            }
+        }
+        assert!(largest > 1.0 && worst < 1e-9 * largest, "{worst:e} of {largest:e}");
+    }
 }
 
 /// Its column is of the torque that the motion takes, its residual where the effort acts: they differ by what the run leaves.

@@ -116,12 +116,13 @@ impl Decision<'_> {
                     Kind::Axis | Kind::Sign if account.joints.len() > 1 => 3.0 * COST,
                     _ => 0.0,
                 };
-                (weighed.score - extra - COST - unlikely - orders + beside, account, weighed)
+                let margin = weighed.likelier_than(&logged.0) + logged.1;
+                (margin - extra - COST - unlikely - orders + beside, account, weighed)
             })
             .collect();
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let (score, account, weighed) = best.first()?;
-        let margin = score - (logged.0.score - logged.1);
+        let (margin, account, weighed) = best.first()?;
+        let margin = *margin;
         let small = |account: &Account| match account.kind {
             Kind::Zero => logs.is_prismatic(account.joints[0]) || account.value.abs() < ZERO,
             Kind::Scale | Kind::Clock => (effort::GAINS.0..effort::GAINS.1).contains(&account.value),
@@ -164,7 +165,7 @@ impl Decision<'_> {
         let twins = |a: Kind, b: Kind| a == Kind::Gravity && matches!(b, Kind::Zero | Kind::Sign | Kind::Axis);
         let other = |other: &Account| other.kind != account.kind || other.joints != account.joints;
         let rival = best.iter().skip(1).find(|(_, rival, _)| other(rival) && !twins(rival.kind, account.kind));
-        let apart = rival.is_none_or(|(other, ..)| score - other > APART);
+        let apart = rival.is_none_or(|(other, ..)| margin - other > APART);
         if let Some((_, twin, left_by)) = rival.filter(|(_, rival, _)| !apart && twins(account.kind, rival.kind))
             && margin > sure
             && explains

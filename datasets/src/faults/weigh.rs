@@ -18,6 +18,8 @@ const GRAMS: f64 = 1e-3;
 const NEAR: f64 = 0.7;
 /// What is left of an effort, squared, is little below this.
 const LITTLE: f64 = 0.03;
+/// An autocorrelation below this is chance.
+const REMEMBERED: f64 = 0.05;
 /// Rounds of weighing the joints against each other.
 const ROUNDS: usize = 4;
 /// Columns of each joint: bias, viscous and dry friction, rotor, gain.
@@ -54,12 +56,16 @@ pub(crate) struct Weighed {
     pub asked: f64,
     /// Share of each joint's effort, squared, that it leaves.
     pub unexplained: Vec<f64>,
+    /// Places that count as one independent one of what it leaves of each joint.
+    pub remembered: Vec<f64>,
     /// Further factor of each joint's effort, 1 where the account has it right.
     pub gain: Vec<f64>,
     /// Its standard error.
     pub gain_error: Vec<f64>,
     /// Standard deviation of every column of the fit over that before it: of the links' parameters, then of what [`OWN`] says.
     pub narrowed: Vec<f64>,
+    /// Places that had a say.
+    places: usize,
     /// Mass that the effort asks the robot to have, over that of its description; gains of the drives are in it.
     pub mass: f64,
     /// Effort that each joint's own motion asks for beside friction and bias, over what the description takes for it.
@@ -75,6 +81,19 @@ impl Weighed {
     pub fn is_plain(&self, active: &[bool]) -> bool {
         let joints = active.iter().filter(|active| **active).count() as f64;
         self.leaves_little(active) && self.asked < 4.0 + 2.0 * joints
+    }
+
+    /// By how many nats it is likelier than another account of the same places. What the better one leaves of a joint is nearer to
+    /// noise, and says how many of them count as one: a wrist's friction under another law than the fit's is left for as long as a
+    /// motion lasts, and is no evidence of its own at every place.
+    pub fn likelier_than(&self, other: &Weighed) -> f64 {
+        let overcounted = |j: usize| {
+            let gained = (other.unexplained[j] / self.unexplained[j]).ln();
+            let least = self.remembered[j].min(other.remembered[j]);
+            0.5 * gained * (independent(self.places) - independent_of(self.places, least))
+        };
+        let overcounted: f64 = (0..self.unexplained.len()).map(overcounted).sum();
+        self.score - other.score - overcounted
     }
 
     /// Whether little of any effort is left.
@@ -111,6 +130,8 @@ struct Row {
     /// Normal equations of the places that have a say.
     normal: DMatrix<f64>,
     right: DVector<f64>,
+    /// Its places that have a say, each with the effort there, N m or N.
+    target: Vec<(usize, f64)>,
     /// Sum of squares of what the description leaves.
     square: f64,
     /// Variance of the effort.
@@ -181,10 +202,24 @@ impl<'a> Rows<'a> {
             let told = table.select_columns(&heard);
             let (normal, right) = (&told * told.transpose(), &told * &left);
             let (square, variance) = (left.norm_squared(), spread(&target));
-            Row { joint, columns, table, normal, right, square, variance }
+            let target = heard.iter().copied().zip(target).collect();
+            Row { joint, columns, table, normal, right, target, square, variance }
         };
         let rows = tables.into_iter().map(row).collect();
         Rows { model, sample, torque, level, rows, places: heard.len() }
+    }
+
+    /// Places of what is left of a joint that count as one: 1 + 2 Σ ρ_k over the first lags whose autocorrelation ρ_k is positive.
+    fn remembered(&self, row: &Row, predicted: &[f64]) -> f64 {
+        let left: Vec<(usize, f64)> =
+            (row.target.iter()).map(|&(place, effort)| (self.sample.log[place], effort - predicted[place])).collect();
+        let power: f64 = left.iter().map(|(_, x)| x * x).sum();
+        let product = |lag: usize| -> f64 {
+            let pairs = left.iter().zip(&left[lag..]).filter(|(a, b)| a.0 == b.0);
+            pairs.map(|(a, b)| a.1 * b.1).sum()
+        };
+        let correlations = (1..left.len()).map(|lag| product(lag) / power);
+        1.0 + 2.0 * correlations.take_while(|rho| *rho > REMEMBERED).sum::<f64>()
     }
 
     fn weigh(&self, freedom: Freedom) -> Weighed {
@@ -237,10 +272,12 @@ impl<'a> Rows<'a> {
         // Without what friction and bias take: the first three of the joint's own columns.
         let mut inertia = vec![(1.0, 1.0); n];
         let (mut sum, mut size) = (0.0, 0.0);
+        let mut remembered = vec![1.0; n];
         for row in &self.rows {
             let (j, torque, mut part) = (row.joint, &self.torque[row.joint], row.part(&solution));
             let further = row.table.tr_mul(&part);
             predicted[j].iter_mut().zip(&further).for_each(|(torque, further)| *torque += further);
+            remembered[j] = self.remembered(row, &predicted[j]);
             part.rows_mut(row.columns.len() - OWN, 3).fill(0.0);
             let further = row.table.tr_mul(&part);
             let torque_of_motion = torque.iter().zip(&further).map(|(torque, further)| (torque + further) * torque);
@@ -259,6 +296,8 @@ impl<'a> Rows<'a> {
             torque: if size > 0.0 { sum / size } else { 1.0 },
             asked,
             unexplained,
+            remembered,
+            places,
             gain: (0..n).map(|j| 1.0 + solution[gain_at(j)]).collect(),
             gain_error: (0..n).map(error).collect(),
             narrowed: (0..width).map(|i| inverse.get((i, i)).map_or(1.0, |x| x.max(0.0).sqrt())).collect(),
@@ -339,8 +378,60 @@ pub(crate) fn independent(places: usize) -> f64 {
     (0.5 * places as f64).min(MOST_INDEPENDENT)
 }
 
+/// The same where what is left is remembered over so many places.
+fn independent_of(places: usize, remembered: f64) -> f64 {
+    independent(places).min(places as f64 / remembered)
+}
+
 /// Variance.
 pub(crate) fn spread(x: &[f64]) -> f64 {
     let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
     x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gapscope_dynamics::robots;
+
+    /// A two-link arm at 400 places, whose first joint's effort is off by some torque, N m.
+    fn weighed(model: &Model, off: impl Fn(f64) -> f64) -> Weighed {
+        let wave = |order: i32| -> Vec<Vec<f64>> {
+            let at = |j: usize, k: usize| {
+                let omega = 1.1 + 0.6 * j as f64;
+                let turned = omega * 0.05 * k as f64 + f64::from(order) * std::f64::consts::FRAC_PI_2;
+                omega.powi(order) * turned.sin()
+            };
+            (0..2).map(|j| (0..400).map(|k| at(j, k)).collect()).collect()
+        };
+        let mut sample = Sample {
+            q: wave(0),
+            v: wave(1),
+            a: wave(2),
+            effort: Vec::new(),
+            log: vec![0; 400],
+            tents: vec![[0.0; 3]; 400],
+            silent: None,
+        };
+        sample.effort = sample.torque(model);
+        sample.effort[0].iter_mut().enumerate().for_each(|(k, effort)| *effort += off(k as f64));
+        weigh(model, &sample, &[1.0; 2], &[true; 2], Freedom::ORDINARY)
+    }
+
+    #[test]
+    fn what_is_left_for_long_is_no_evidence_of_its_own_at_every_place() {
+        let model = robots::model("double_pendulum").unwrap().unwrap().model;
+        let gained = |off: &dyn Fn(f64) -> f64| {
+            let [better, worse] = [0.5, 1.0].map(|size| weighed(&model, |k| size * off(k)));
+            let nats = better.likelier_than(&worse);
+            assert!((nats + worse.likelier_than(&better)).abs() < 1e-9, "what speaks for one speaks against the other");
+            nats / (better.score - worse.score)
+        };
+        // Signs that know nothing of each other.
+        let noise = |k: f64| if (7.7 * k * k).sin() > 0.0 { 0.3 } else { -0.3 };
+        assert!((gained(&noise) - 1.0).abs() < 0.05, "{}", gained(&noise));
+        // One sign for twenty places, as another law of friction leaves it.
+        let steps = |k: f64| noise((k / 20.0).floor());
+        assert!((0.05..0.35).contains(&gained(&steps)), "{}", gained(&steps));
+    }
 }

@@ -139,6 +139,35 @@ pub(super) fn along(parts: &[(usize, f64)], x: &[f64]) -> f64 {
     parts.iter().map(|&(j, weight)| weight * x[j]).sum()
 }
 
+/// Takes from what is `left` of joints, N m (N), the forces that leave least of it: of each direction that stands, `bound` tells
+/// by its place, any up to that bound (projected Gauss–Seidel). A coupling and the frictions of its two joints share what they
+/// hold.
+pub(super) fn hold<D: std::borrow::Borrow<Direction>>(
+    directions: &[D],
+    bound: impl Fn(usize) -> Option<f64>,
+    left: &mut [f64],
+    forces: &mut [f64],
+) {
+    forces.fill(0.0);
+    let standing = || directions.iter().map(D::borrow).enumerate().filter_map(|(i, d)| Some((i, d, bound(i)?)));
+    // Directions that share no joint settle in one sweep.
+    let shared = standing().any(|(_, d, _)| d.parts.len() > 1);
+    for _ in 0..if shared { SWEEPS } else { 1 } {
+        let (mut change, mut largest) = (0.0f64, 0.0f64);
+        for (i, direction, bound) in standing() {
+            let square: f64 = direction.parts.iter().map(|&(_, weight)| weight * weight).sum();
+            let next = (forces[i] + direction.along(left) / square).clamp(-bound, bound);
+            let by = next - forces[i];
+            direction.parts.iter().for_each(|&(j, weight)| left[j] -= weight * by);
+            forces[i] = next;
+            (change, largest) = (change.max(by.abs()), largest.max(next.abs()));
+        }
+        if change <= TOLERANCE * largest {
+            break;
+        }
+    }
+}
+
 impl Plant {
     /// Takes the impulses of dry friction, bristles and play of a time `h` from `scratch.v_end`.
     /// Bounds are those at `time` and the predicted speed `scratch.v`.

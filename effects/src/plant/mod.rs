@@ -158,7 +158,7 @@ impl Plant {
             motor_encoders: false,
             rows: Vec::new(),
             substeps: 1,
-            scratch: Scratch::new(n, 0),
+            scratch: Scratch::new(n, 0, 0),
             tangent: Tangent::new(n),
         };
         for (j, joint) in model.joints().iter().enumerate() {
@@ -202,7 +202,7 @@ impl Plant {
             self.substeps = (self.dt / LONGEST_WITH_PLAY - 1e-9).ceil().max(1.0) as usize;
         }
         self.rows = directions.chain(bristles).chain(play).collect();
-        self.scratch = Scratch::new(n, motors);
+        self.scratch = Scratch::new(n, motors, self.directions.len());
     }
 
     /// The same plant with the encoders of elastic joints, and of joints with play, on the motor's side:

@@ -1,5 +1,6 @@
 //! What a plant leaves of a measured motion: the effort that was logged less the effort that the plant would have logged.
 
+use super::friction::hold;
 use super::{Direction, Plant};
 use crate::Motion;
 use crate::filter::{bristle, early, first_order, late};
@@ -344,22 +345,23 @@ impl Plant {
             let joins = |d: &&Direction| d.parts.len() > 1 && d.parts.iter().any(|&(of, _)| of == j);
             self.directions.iter().filter(joins).any(stands)
         };
-        for standing in [false, true] {
-            for direction in self.directions.iter().filter(|d| stands(d) == standing) {
-                let speed = direction.along(v);
-                let square: f64 = direction.parts.iter().map(|&(_, weight)| weight * weight).sum();
-                let loaded = standing || (direction.load > 0.0 && held(direction.parts[0].0));
-                let bound = if loaded {
-                    direction.bound(speed, past.time, &s.delivered)
-                } else {
-                    direction.unloaded_bound(speed, past.time)
-                };
-                let force = sliding(bound, speed, band(direction), direction.along(residual) / square);
-                for &(j, weight) in &direction.parts {
-                    residual[j] -= weight * force;
-                }
+        for direction in self.directions.iter().filter(|d| !stands(d)) {
+            let speed = direction.along(v);
+            let loaded = direction.load > 0.0 && held(direction.parts[0].0);
+            let bound = if loaded {
+                direction.bound(speed, past.time, &s.delivered)
+            } else {
+                direction.unloaded_bound(speed, past.time)
+            };
+            for &(j, weight) in &direction.parts {
+                residual[j] -= weight * bound * speed.signum();
             }
         }
+        let bound = |i: usize| {
+            let direction = &self.directions[i];
+            stands(direction).then(|| direction.bound(direction.along(v), past.time, &s.delivered).max(0.0))
+        };
+        hold(&self.directions, bound, residual, &mut s.held);
         // Friction that grows with the load takes its part of the effort that overcomes all else: from the effort predicted,
         // not from the one measured, which with μ = 1 would explain itself.
         for direction in self.directions.iter().filter(|d| d.load > 0.0) {

@@ -33,10 +33,12 @@ pub(super) struct Scratch {
     outside: Vec<f64>,
     /// What all but dry friction leaves of a sample of a measured motion, N m, n.
     pub(super) smooth: Vec<f64>,
+    /// What each direction that stands holds of a sample of a measured motion, N m.
+    pub(super) held: Vec<f64>,
 }
 
 impl Scratch {
-    pub(super) fn new(joints: usize, motors: usize) -> Scratch {
+    pub(super) fn new(joints: usize, motors: usize, directions: usize) -> Scratch {
         let all = joints + motors;
         let [q_start, v_start, q, v, v_end, force] = std::array::from_fn(|_| vec![0.0; all]);
         Scratch {
@@ -54,6 +56,7 @@ impl Scratch {
             contact: vec![0.0; joints],
             outside: vec![0.0; joints],
             smooth: vec![0.0; joints],
+            held: vec![0.0; directions],
         }
     }
 }

@@ -5,8 +5,8 @@ use crate::{common, support};
 use common::robot;
 use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{
-    Candidate, CoulombFriction, Effect, EncoderSide, JointZeroOffset, Kind, LinkInertiaError, LoadDependentFriction,
-    Motion, Payload, Plant, Range,
+    Candidate, CoulombFriction, Effect, EncoderSide, JointCoupling, JointZeroOffset, Kind, LinkInertiaError,
+    LoadDependentFriction, Motion, Payload, Plant, Range,
 };
 use support::motion;
 
@@ -306,4 +306,44 @@ fn a_joint_that_slips_at_its_greatest_friction_leaves_the_noise_of_its_accelerat
     assert!((mean_left(1.25) - 0.25).abs() < 1e-9, "{}", mean_left(1.25));
     assert!((mean_left(-1.25) + 0.25).abs() < 1e-9, "{}", mean_left(-1.25));
     assert_eq!(mean_left(0.8), 0.0, "it holds");
+}
+
+/// A coupling holds 0.6 N m, each joint 0.1 N m by itself: torques that pull the joints apart are shared, sample by sample and
+/// beside noise that exceeds all of it.
+#[test]
+fn joints_that_a_coupling_joins_hold_together_what_their_frictions_can() {
+    let model = robot("double_pendulum").with_gravity(glam::DVec3::ZERO);
+    let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+    let coupling = JointCoupling {
+        joints: [names[0].clone(), names[1].clone()],
+        ratio: -1.0,
+        coulomb: 0.6,
+        viscous: 0.0,
+        armature: 0.0,
+    };
+    let own = CoulombFriction { coulomb: names.iter().map(|name| (name.clone(), 0.1)).collect() };
+    let effects = [Effect::JointCoupling(coupling), Effect::CoulombFriction(own)];
+    let mut plant = Plant::new(&model, &effects, DT).unwrap();
+    let samples = 400;
+    let still = [STILL; 2];
+    for (effort, left) in [
+        ([0.65, -0.65], [0.0, 0.0]),
+        ([0.8, -0.8], [0.1, -0.1]),
+        ([0.15, 0.02], [0.0, 0.0]),
+        ([0.4, 0.05], [0.125, 0.125]),
+    ] {
+        let mut rest = [f64::NAN; 2];
+        plant.residual(&[0.3, -0.4], &[0.0; 2], &[0.0; 2], &effort, &still, &mut rest);
+        assert!((0..2).all(|j| (rest[j] - left[j]).abs() < 1e-6), "{rest:?} of {effort:?}");
+        let of = |x: [f64; 2]| x.map(|x| vec![x; samples]).to_vec();
+        let noise = (0..2).map(|_| (0..samples).map(|k| if k % 2 == 0 { 20.0 } else { -20.0 }).collect());
+        let noise: Vec<Vec<f64>> = noise.collect();
+        let (q, v, tau) = (of([0.3, -0.4]), of([0.5 * STILL; 2]), of(effort));
+        let along = plant.residuals(&motion(&model, [&q, &v, &noise, &tau, &tau], DT, &still));
+        for j in 0..2 {
+            let inner = &along[j][100..samples - 100];
+            let mean = inner.iter().sum::<f64>() / inner.len() as f64;
+            assert!((mean - left[j]).abs() < 1e-3, "{mean} of {effort:?}");
+        }
+    }
 }

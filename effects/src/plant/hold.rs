@@ -13,8 +13,8 @@ const ALL: f64 = 1e-6;
 
 impl Plant {
     /// Friction of joints at rest, once more: sample by sample it would hold what noise takes off the needed torque, and leave
-    /// what noise adds. A joint that slips at its greatest friction would leave the mean size of that noise. Joints that couplings
-    /// join rest together.
+    /// what noise adds. A joint that slips at its greatest friction would leave the mean size of that noise. Joints that a
+    /// coupling joins share what it holds while all of them rest.
     pub(super) fn hold(
         &self,
         motion: &Motion,
@@ -28,36 +28,54 @@ impl Plant {
         for joints in self.joined() {
             let open = |j: &usize| turning.contains(j) || self.bristles.iter().any(|b| b.joint == *j);
             let of: Vec<&Direction> = self.directions.iter().filter(|d| joints.contains(&d.parts[0].0)).collect();
-            let all_rest = |k: &usize| joints.iter().all(|&j| rests(j, *k));
-            if of.is_empty() || joints.iter().any(open) || !(0..motion.len()).any(|k| all_rest(&k)) {
+            let any_rests = |k: &usize| joints.iter().any(|&j| rests(j, *k));
+            if of.is_empty() || joints.iter().any(open) || !(0..motion.len()).any(|k| any_rests(&k)) {
                 continue;
             }
-            let needed: Vec<Vec<f64>> =
-                (joints.iter()).map(|&j| out[j].iter().zip(&dry[j]).map(|(rest, dry)| rest + dry).collect()).collect();
-            // Friction under load is bounded by the effort, whose noise is in every sample as well.
-            let mut delivered = vec![0.0; n];
+            let speed = |d: &Direction, k: usize| -> f64 { d.parts.iter().map(|&(j, w)| w * motion.v[j][k]).sum() };
+            let stands = |d: &Direction, k: usize| {
+                let band: f64 = d.parts.iter().map(|&(j, w)| w.abs() * motion.standstill[j]).sum();
+                speed(d, k).abs() < band
+            };
+            // What each direction holds at most, and what of the needed torque sliding couplings leave of each joint.
             let mut bounds: Vec<Vec<f64>> = vec![Vec::with_capacity(motion.len()); of.len()];
+            let mut left = vec![Vec::with_capacity(motion.len()); joints.len()];
+            let (mut delivered, mut at) = (vec![0.0; n], vec![0.0; n]);
             for k in 0..motion.len() {
-                joints.iter().for_each(|&j| delivered[j] = self.actuation.at_joint(j, tau[j][k]));
+                for &j in &joints {
+                    // Friction under load is bounded by the effort, whose noise is in every sample as well.
+                    delivered[j] = self.actuation.at_joint(j, tau[j][k]);
+                    at[j] = out[j][k] + dry[j][k];
+                }
                 let time = motion.start + k as f64 * motion.dt;
                 for (direction, bounds) in of.iter().zip(&mut bounds) {
-                    let speed: f64 = direction.parts.iter().map(|&(j, weight)| weight * motion.v[j][k]).sum();
-                    bounds.push(direction.bound(speed, time, &delivered).max(0.0));
+                    let speed = speed(direction, k);
+                    let bound = direction.bound(speed, time, &delivered).max(0.0);
+                    bounds.push(bound);
+                    if direction.parts.len() > 1 && !stands(direction, k) {
+                        direction.parts.iter().for_each(|&(j, weight)| at[j] -= weight * bound * speed.signum());
+                    }
                 }
+                joints.iter().zip(&mut left).for_each(|(&j, left)| left.push(at[j]));
             }
             let mean = |rows: &[Vec<f64>]| -> Vec<Vec<f64>> {
                 rows.iter().map(|x| smoothed(x, HOLDS_OVER, motion.dt)).collect()
             };
-            let (likely, limits) = (mean(&needed), mean(&bounds));
-            let mut left = vec![0.0; n];
+            let (likely, limits) = (mean(&left), mean(&bounds));
             let mut forces = vec![0.0; of.len()];
-            for k in (0..motion.len()).filter(all_rest) {
-                joints.iter().zip(&likely).for_each(|(&j, likely)| left[j] = likely[k]);
-                hold(&of, |i| Some(limits[i][k]), &mut left, &mut forces);
-                for (&j, (needed, likely)) in joints.iter().zip(needed.iter().zip(&likely)) {
-                    let slips = left[j].abs() > ALL * likely[k].abs();
-                    out[j][k] = if slips { needed[k] - (likely[k] - left[j]) } else { 0.0 };
-                    dry[j][k] = needed[k] - out[j][k];
+            for k in (0..motion.len()).filter(any_rests) {
+                let rests_in_all = |d: &Direction| d.parts.iter().all(|&(j, _)| rests(j, k));
+                // A coupling that stands while its joints move holds what no joint's rest tells.
+                if of.iter().any(|d| d.parts.len() > 1 && stands(d, k) && !rests_in_all(d)) {
+                    continue;
+                }
+                joints.iter().zip(&likely).for_each(|(&j, likely)| at[j] = likely[k]);
+                hold(&of, |i| rests_in_all(of[i]).then(|| limits[i][k]), &mut at, &mut forces);
+                for (&j, (left, likely)) in joints.iter().zip(left.iter().zip(&likely)).filter(|(j, _)| rests(**j, k)) {
+                    let needed = out[j][k] + dry[j][k];
+                    let slips = at[j].abs() > ALL * likely[k].abs();
+                    out[j][k] = if slips { left[k] - (likely[k] - at[j]) } else { 0.0 };
+                    dry[j][k] = needed - out[j][k];
                 }
             }
         }

@@ -41,27 +41,50 @@ static void smooth(const double *q, const double *v, const double *a, const doub
     }
 }
 
+/* What stands holds what all that slides leaves: the forces, each up to its bound, that leave least. A coupling and the frictions
+   of its two joints share what they hold. */
+static void hold(const double *v, const double *delivered, double *rest)
+{
+    double force[GAPSCOPE_LENGTH(DIRECTIONS)];
+    int i, sweep;
+    for (i = 0; i < DIRECTIONS; i++) force[i] = 0.0;
+    for (sweep = 0; sweep < 60; sweep++) {
+        double change = 0.0, largest = 0.0;
+        for (i = 0; i < DIRECTIONS; i++) {
+            const direction *d = &directions[i];
+            double speed = along(d, v), square = d->weight[0] * d->weight[0] + d->weight[1] * d->weight[1], next;
+            if (fabs(speed) >= band(d)) continue;
+            next = clamp(force[i] + along(d, rest) / square, fmax(bound(d, speed, HUGE_VAL, delivered), 0.0));
+            rest[d->joint[0]] -= d->weight[0] * (next - force[i]);
+            rest[d->joint[1]] -= d->weight[1] * (next - force[i]);
+            change = fmax(change, fabs(next - force[i]));
+            largest = fmax(largest, fabs(next));
+            force[i] = next;
+        }
+        if (change <= 1e-10 * largest) break;
+    }
+}
+
 void gapscope_rest(const double *q, const double *v, const double *a, const double *tau, double *rest)
 {
     double delivered[N];
-    int i, j, standing;
+    int i, j;
     for (j = 0; j < N; j++) delivered[j] = at_joint(j, tau[j]);
     smooth(q, v, a, delivered, rest);
     for (i = 0; i < GAPSCOPE_BRISTLES; i++) {
         j = bristles[i].joint;
         rest[j] -= sliding(bristles[i].coulomb, v[j], standstill[j], rest[j]);
     }
-    /* What stands holds what all that slides leaves. */
-    for (standing = 0; standing < 2; standing++)
-        for (i = 0; i < DIRECTIONS; i++) {
-            const direction *d = &directions[i];
-            double speed = along(d, v), force, square = d->weight[0] * d->weight[0] + d->weight[1] * d->weight[1];
-            int loaded = standing || (d->load > 0.0 && held(d->joint[0], v));
-            if ((fabs(speed) < band(d)) != standing) continue;
-            force = sliding(bound(d, speed, HUGE_VAL, loaded ? delivered : NULL), speed, band(d), along(d, rest) / square);
-            rest[d->joint[0]] -= d->weight[0] * force;
-            rest[d->joint[1]] -= d->weight[1] * force;
-        }
+    for (i = 0; i < DIRECTIONS; i++) {
+        const direction *d = &directions[i];
+        double speed = along(d, v), force;
+        int loaded = d->load > 0.0 && held(d->joint[0], v);
+        if (fabs(speed) < band(d)) continue;
+        force = copysign(bound(d, speed, HUGE_VAL, loaded ? delivered : NULL), speed);
+        rest[d->joint[0]] -= d->weight[0] * force;
+        rest[d->joint[1]] -= d->weight[1] * force;
+    }
+    hold(v, delivered, rest);
     /* Friction under load goes by the effort that the motion takes, not by the one that is given. */
     for (i = 0; i < DIRECTIONS; i++) {
         const direction *d = &directions[i];

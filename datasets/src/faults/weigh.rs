@@ -57,7 +57,7 @@ pub(crate) struct Weighed {
     /// Share of each joint's effort, squared, that it leaves.
     pub unexplained: Vec<f64>,
     /// Places that count as one independent one of what it leaves of each joint.
-    pub remembered: Vec<f64>,
+    remembered: Vec<f64>,
     /// Further factor of each joint's effort, 1 where the account has it right.
     pub gain: Vec<f64>,
     /// Its standard error.

@@ -345,7 +345,8 @@ fn joints_that_a_coupling_joins_hold_together_what_their_frictions_can() {
             let mean = inner.iter().sum::<f64>() / inner.len() as f64;
             assert!((mean - left[j]).abs() < 1e-3, "{mean} of {effort:?}");
         }
-    } // The first rests while the second turns: the coupling slides, and the first holds by itself what that leaves.
+    }
+    // The first rests while the second turns: the coupling slides, and the first holds by itself what that leaves.
     let of = |x: [f64; 2]| x.map(|x| vec![x; samples]).to_vec();
     let noise: Vec<f64> = (0..samples).map(|k| if k % 2 == 0 { 20.0 } else { -20.0 }).collect();
     for (effort, left) in [([-0.55, 0.7], 0.0), ([-0.9, 0.7], -0.2)] {

@@ -26,7 +26,7 @@ pub struct Motion<'a> {
     pub tau: &'a [Vec<f64>],
     /// Torque that this motion takes of the nominal robot, damping and friction of its URDF included, N m or N.
     pub nominal: &'a [Vec<f64>],
-    /// Torque that loads the gears, N m or N: the nominal one, or where it is known better what the plant takes with its effects.
+    /// Torque that loads the gears, N m or N: the nominal one, or where it is known better what the drives deliver.
     pub load: &'a [Vec<f64>],
     /// Torque that the motion takes of the robot with all that was found of it, N m or N; the nominal one before that. A law
     /// that acts on the effort is told by it and not by the measured effort, whose noise would explain itself.

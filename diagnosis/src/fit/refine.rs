@@ -318,14 +318,12 @@ impl Data<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::band::Band;
-    use crate::record::known::Known;
-    use crate::record::signals::standstill;
+    use crate::fit::support::on_data;
     use gapscope_datasets::{Recipe, generate};
     use gapscope_dynamics::robots;
     use gapscope_effects::{LoadDependentFriction, TorqueBias, TorqueGainError};
 
-    /// A gear is loaded by what its drive delivers. By the logged effort, of which a bias is half, the column of this friction
+    /// A gear is loaded by what its drive delivers. By the logged effort, most of which is a bias, the column of this friction
     /// points elsewhere than its torque, and no chord comes to its coefficient.
     #[test]
     fn friction_under_load_is_found_beside_a_bias_and_a_gain() {
@@ -333,26 +331,16 @@ mod tests {
         let on = |values: [f64; 2]| model.joints().iter().map(|j| j.name.clone()).zip(values).collect();
         let effects = [
             Effect::LoadDependentFriction(LoadDependentFriction { load_coefficient: on([0.15, 0.2]) }),
-            Effect::TorqueBias(TorqueBias { bias: on([4.0, 3.0]) }),
+            Effect::TorqueBias(TorqueBias { bias: on([30.0, 20.0]) }),
             Effect::TorqueGainError(TorqueGainError { gain: on([0.9, 1.1]) }),
         ];
         let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
         let log = |seed| Signals::new(&model, &generate(&model, &effects, seed, &recipe, "log").unwrap()).unwrap();
         let signals: Vec<Signals> = (1..4).map(log).collect();
-        let (band, still) = (Band::new(&signals), standstill(&signals, 2));
-        let data = Data {
-            model: &model,
-            signals: &signals,
-            band: &band,
-            standstill: &still,
-            moving: &[true; 2],
-            noise: &[1e-3; 2],
-            known: &Known::default(),
-        };
-        let kinds = [Kind::LoadDependentFriction, Kind::TorqueBias, Kind::TorqueGainError];
+        let kinds = [Kind::LoadDependentFriction, Kind::TorqueBias, Kind::TorqueGainError, Kind::CoulombFriction];
         let candidates: Vec<Candidate> =
             kinds.into_iter().flat_map(|kind| (0..2).map(move |j| Candidate::new(kind, vec![j]))).collect();
-        let (problem, fit) = data.refine(&candidates, None).unwrap();
+        let (problem, fit) = on_data(&model, &signals, |data| data.refine(&candidates, None)).unwrap();
         for (c, truth) in [(0, 0.15), (1, 0.2)] {
             let found = fit.own(&problem, c).1[0];
             assert!((found - truth).abs() < 0.003, "{found} and {truth}");

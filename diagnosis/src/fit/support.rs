@@ -5,9 +5,10 @@ use crate::fit::problem::Problem;
 use crate::fit::terms::Term;
 use crate::record::band::Band;
 use crate::record::data::Data;
+use crate::record::known::Known;
 use crate::record::signals::{Signals, standstill};
 use gapscope_datasets::{Recipe, generate};
-use gapscope_dynamics::robots;
+use gapscope_dynamics::{Model, robots};
 use gapscope_effects::{Candidate, Kind};
 
 /// A kind fitted to the first joint of a double pendulum, of logs to which something is done.
@@ -26,22 +27,29 @@ pub(crate) fn fitted_as(candidates: Vec<Candidate>, done: impl Fn(&mut Signals))
             s
         })
         .collect();
-    let (band, still) = (Band::new(&signals), standstill(&signals, 2));
-    let data = Data {
-        model: &model,
-        signals: &signals,
-        band: &band,
-        standstill: &still,
-        moving: &[true; 2],
-        noise: &[1e-3; 2],
-        known: &crate::record::known::Known::default(),
-    };
-    let terms: Vec<Term> = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
-    let all: Vec<usize> = (0..terms.len()).collect();
-    let mut problem = data.problem(terms, &Kind::ALL);
-    problem.split(&band);
-    let fit = Fit::on_all(&problem, &all);
+    let (band, problem, fit) = on_data(&model, &signals, |data| {
+        let terms: Vec<Term> = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
+        let all: Vec<usize> = (0..terms.len()).collect();
+        let mut problem = data.problem(terms, &Kind::ALL);
+        problem.split(data.band);
+        let fit = Fit::on_all(&problem, &all);
+        (data.band.clone(), problem, fit)
+    });
     (signals, band, problem, fit)
+}
+
+/// What is made of the data of some logs whose joints all move, with noise of a thousandth.
+pub(crate) fn on_data<T>(model: &Model, signals: &[Signals], make: impl FnOnce(&Data<'_>) -> T) -> T {
+    let n = model.dof();
+    make(&Data {
+        model,
+        signals,
+        band: &Band::new(signals),
+        standstill: &standstill(signals, n),
+        moving: &vec![true; n],
+        noise: &vec![1e-3; n],
+        known: &Known::default(),
+    })
 }
 
 /// Torque on the first joint, from its velocity.

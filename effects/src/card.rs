@@ -40,6 +40,8 @@ pub struct Card {
     pub reads_found: bool,
     /// Whether it changes the effort before it acts. It is told by the torque that the motion takes.
     pub on_effort: bool,
+    /// What stands between its torque and the effort that is logged.
+    pub behind: Behind,
     /// How its motor turns on its own.
     pub turning: Option<Turning>,
     /// Whether it is the inertia of a motor, which then turns on its own.
@@ -76,6 +78,18 @@ pub enum Part {
     Servo,
     /// A law that the catalogue does not have: what its effects are held against.
     Outside,
+}
+
+/// What stands between the torque of a law and the effort that is logged: by it a newton metre more of the law takes more or less
+/// than one of the effort.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Behind {
+    /// A gear, whose friction may rise with the load, and a drive with its gain.
+    Gear,
+    /// A drive with its gain.
+    Drive,
+    /// Nothing: its columns are of the logged effort.
+    Nothing,
 }
 
 /// Where a robot can have a kind.
@@ -305,6 +319,7 @@ impl Card {
         bends: false,
         reads_found: false,
         on_effort: false,
+        behind: Behind::Gear,
         turning: None,
         rotor: false,
         body: false,

@@ -24,7 +24,9 @@ mod wind_up;
 
 pub use bodies::{Body, Divergence, keep_bodies, leave_to_link};
 pub use candidate::{Candidate, EncoderSide, Range};
-pub use card::{Apart, Axis, Card, Force, Gauge, Grid, Knob, Late, Part, Place, Pushes, Rests, Size, Turned, Turning};
+pub use card::{
+    Apart, Axis, Behind, Card, Force, Gauge, Grid, Knob, Late, Part, Place, Pushes, Rests, Size, Turned, Turning,
+};
 pub use catalogue::*;
 pub use column::Column;
 pub use error::EffectError;

@@ -1,6 +1,7 @@
 //! The least-squares problem behind the choice of effects, kept as normal equations per block, so that any subset of
 //! candidates is fitted, held out and resampled in microseconds.
 
+mod behind;
 mod embody;
 mod evidence;
 mod score;
@@ -29,7 +30,7 @@ struct JointRows {
     columns: Vec<usize>,
     /// Index into the band's rows.
     rows: Vec<usize>,
-    /// Row-major values, `rows × columns`.
+    /// Row-major values, `rows × columns`: what a unit of each coefficient takes of the logged effort.
     values: Vec<f64>,
     target: Vec<f64>,
     /// The target before any bending.
@@ -182,7 +183,7 @@ impl Problem {
         for row in &band.rows {
             fold_of_block[row.block] = row.fold;
         }
-        Problem {
+        let mut problem = Problem {
             entries,
             bounds,
             closed: Vec::new(),
@@ -202,7 +203,9 @@ impl Problem {
             training: Vec::new(),
             held: Vec::new(),
             total: Normal::zeros(p),
-        }
+        };
+        problem.put_behind(signals, band, standstill);
+        problem
     }
 
     /// Adds to the target what effects that were found change of the residual beyond their linear signature, so that fitting
@@ -274,7 +277,8 @@ impl Problem {
     }
 
     /// Puts other candidates of the same kinds and joints in the places of some entries, and reads anew what the alignment does.
-    /// Where another gravity was found, all bodies are to be among them.
+    /// Where another gravity was found, all bodies are to be among them. Columns are of torque on the joint: a problem to choose
+    /// from holds accounts without the gears and drives that were found.
     pub fn replace(
         &mut self,
         model: &Model,

@@ -157,13 +157,16 @@ impl Data<'_> {
                 let driven = if crossed { &s.tau } else { &idle };
                 let effort = torque(&effects, driven)?;
                 let taken = if taken.len() == effects.len() { effort.clone() } else { torque(&taken, driven)? };
-                let drives = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?.drives();
+                let plant = plant_pushed(self.model, &effects, side, s.dt, &s.pushed)?;
+                let drives = plant.drives();
                 // A gear is loaded by what its drive delivers, not by what was logged.
                 let delivers = |(effort, (gain, bias)): (Vec<f64>, &(f64, f64))| {
                     effort.into_iter().map(|effort| gain * effort + bias).collect()
                 };
+                let load: Vec<Vec<f64>> = effort.into_iter().zip(&drives).map(delivers).collect();
                 Ok(Signals {
-                    load: Some(effort.into_iter().zip(&drives).map(delivers).collect()),
+                    gears: plant.gears(&Motion { load: &load, ..s.motion(self.model, self.standstill) }),
+                    load: Some(load),
                     taken: Some(taken),
                     bodies: Some(bodies.clone()),
                     drives,

@@ -57,6 +57,9 @@ pub struct Signals {
     pub nominal: Vec<Vec<f64>>,
     /// Torque that loads the gears, N m or N, where it is known better than from the nominal robot.
     pub load: Option<Vec<Vec<f64>>>,
+    /// What each newton metre more that a joint takes needs of the torque that loads its gear, see
+    /// [`gapscope_effects::Plant::gears`]; empty where nothing is known.
+    pub gears: Vec<Vec<f64>>,
     /// Torque that the motion takes with what was found, N m or N, where that is known.
     pub taken: Option<Vec<Vec<f64>>>,
     /// The robot with the bodies and the gravity that were found, where they are known.
@@ -130,6 +133,7 @@ impl Signals {
             tau_rate,
             nominal: vec![Vec::with_capacity(length); n],
             load: None,
+            gears: Vec::new(),
             taken: None,
             bodies: None,
             drives: Vec::new(),

@@ -3,7 +3,7 @@
 //! τ_effective(t) = τ(t − delay), τ held between samples; a fraction of a sample is allowed.
 //! Source: Åström, Wittenmark, Computer-Controlled Systems (1997) (sampling a system with a time delay).
 
-use crate::card::{Card, Force, Gauge, LATE, LATE_EXACT_TO, LATE_SPREAD, Late, Place, Size};
+use crate::card::{Behind, Card, Force, Gauge, LATE, LATE_EXACT_TO, LATE_SPREAD, Late, Place, Size};
 use crate::filter::{early, late};
 use crate::law::{Law, Listed, Signature, Value, check};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
@@ -51,6 +51,7 @@ impl Signature for ActuationDelay {
         reads_found: true,
         on_effort: true,
         weighs: true,
+        behind: Behind::Drive,
         ..Card::BLANK
     };
 

@@ -3,7 +3,7 @@
 //! T u̇ = τ − u, τ_effective = u.
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), chapter 5 (the drive's current loop).
 
-use crate::card::{Card, Force, Gauge, LATE, LATE_EXACT_TO, LATE_SPREAD, Late, Place, Size};
+use crate::card::{Behind, Card, Force, Gauge, LATE, LATE_EXACT_TO, LATE_SPREAD, Late, Place, Size};
 use crate::filter::{first_derivative, first_order};
 use crate::law::{Law, Listed, Signature, Value, check};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
@@ -57,6 +57,7 @@ impl Signature for ActuatorLag {
         reads_found: true,
         on_effort: true,
         weighs: true,
+        behind: Behind::Drive,
         ..Card::BLANK
     };
 

@@ -3,7 +3,7 @@
 //! τ_effective = τ + bias.
 //! Source: Janot, Vandanjon, Gautier, IEEE Trans. Control Systems Technology 22(1) 2014, eq. 3 (offset of the drive).
 
-use crate::card::{Axis, Card, Force, Gauge, Part, Size};
+use crate::card::{Axis, Behind, Card, Force, Gauge, Part, Size};
 use crate::law::{Law, Listed, Signature, Value, check, per_joint};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
 use gapscope_dynamics::Model;
@@ -51,6 +51,7 @@ impl Signature for TorqueBias {
         axis: Axis::Position,
         weighs: true,
         common: true,
+        behind: Behind::Drive,
         ..Card::BLANK
     };
 

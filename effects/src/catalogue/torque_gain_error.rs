@@ -3,7 +3,7 @@
 //! τ_effective = gain · τ.
 //! Source: Gautier, Briot, Global identification of joint drive gains, ASME J. Dyn. Sys. 136(5) 2014, section 2.
 
-use crate::card::{Apart, Axis, Card, Gauge, Size};
+use crate::card::{Apart, Axis, Behind, Card, Gauge, Size};
 use crate::law::{Law, Listed, Signature, Value, check, per_joint};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
 use gapscope_dynamics::Model;
@@ -55,6 +55,7 @@ impl Signature for TorqueGainError {
         reads_found: true,
         on_effort: true,
         weighs: true,
+        behind: Behind::Nothing,
         ..Card::BLANK
     };
 

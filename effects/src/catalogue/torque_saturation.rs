@@ -3,7 +3,7 @@
 //! τ_effective = min(max(τ, −limit), limit), after delay, lag, gain and bias.
 //! Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), chapter 5 (limits of drives).
 
-use crate::card::{Card, Grid, Knob, Size, Turned};
+use crate::card::{Behind, Card, Grid, Knob, Size, Turned};
 use crate::law::{Law, Listed, Signature, Value, check, per_joint};
 use crate::{Candidate, Column, EffectError, Kind, Motion, Plant};
 use gapscope_dynamics::Model;
@@ -56,6 +56,7 @@ impl Signature for TorqueSaturation {
         size: Size::Knob("limit", ["N m", "N"]),
         reads_found: true,
         unit_coefficient: true,
+        behind: Behind::Nothing,
         ..Card::BLANK
     };
 

@@ -20,6 +20,7 @@ pub use friction::{Bristle, Direction};
 
 use crate::error::{EffectError, check};
 use crate::kind::Kind;
+use crate::motion::{Motion, mean_size};
 pub use actuation::Actuation;
 use drive::Drive;
 use friction::Row;
@@ -216,6 +217,23 @@ impl Plant {
     /// Gain and bias (N m or N) of each joint's drive.
     pub fn drives(&self) -> Vec<(f64, f64)> {
         self.actuation.gain.iter().copied().zip(self.actuation.bias.iter().copied()).collect()
+    }
+
+    /// What each newton metre more that a joint takes needs of the torque that loads its gear, joint-major like the motion's
+    /// signals: with friction that rises with the load, 1 / (1 − μ sign(q̇) sign(load)), and 1 without or where the joint stands.
+    /// The sign of a load that noise drives to and fro is its mean.
+    pub fn gears(&self, motion: &Motion) -> Vec<Vec<f64>> {
+        let mut gears: Vec<Vec<f64>> = motion.v.iter().map(|v| vec![1.0; v.len()]).collect();
+        for direction in self.directions.iter().filter(|d| d.load > 0.0) {
+            let &[(j, _)] = direction.parts.as_slice() else { continue };
+            let noise = self.actuation.gain[j] * motion.effort_noise.get(j).copied().unwrap_or(0.0);
+            for ((gear, v), load) in gears[j].iter_mut().zip(&motion.v[j]).zip(&motion.load[j]) {
+                if v.abs() >= motion.standstill[j] {
+                    *gear = 1.0 / (1.0 - direction.load * v.signum() * mean_size(*load, noise).1);
+                }
+            }
+        }
+        gears
     }
 
     /// The rigid-body model with the inertial effects and the gravity of this plant.

@@ -285,6 +285,35 @@ fn friction_under_the_load_of_a_noisy_effort_goes_by_its_mean_size() {
     assert!(left(&[]).abs() > 0.05, "{}", left(&[]));
 }
 
+/// Each newton metre more that a joint takes needs more of a loaded gear, or less where the load drives the joint.
+#[test]
+fn what_a_gear_needs_is_the_slope_of_the_plant() {
+    let inertia = 0.2;
+    let model = support::hinge(inertia);
+    let friction = LoadDependentFriction { load_coefficient: std::iter::once(("joint1".to_owned(), 0.2)).collect() };
+    let mut plant = Plant::new(&model, &[Effect::LoadDependentFriction(friction)], DT).unwrap();
+    let of = |x: f64| vec![vec![x; 50]];
+    let (q, tau, still) = (of(0.0), of(0.0), [STILL]);
+    for (noise, needed, speed) in [(&[][..], 0.5, 1.0), (&[], 0.5, -1.0), (&[], -0.5, 1.0), (&[0.7], 0.5, 1.0)] {
+        let v = of(speed);
+        let effort = |plant: &mut Plant, needed: f64| {
+            let a = of(needed / inertia);
+            let motion = motion(&model, [&q, &v, &a, &tau, &tau], DT, &still);
+            -plant.residuals(&Motion { effort_noise: noise, ..motion })[0][25]
+        };
+        let load = of(effort(&mut plant, needed));
+        let step = 1e-5;
+        let slope = (effort(&mut plant, needed + step) - effort(&mut plant, needed - step)) / (2.0 * step);
+        let a = of(needed / inertia);
+        let motion = motion(&model, [&q, &v, &a, &tau, &load], DT, &still);
+        let gear = plant.gears(&Motion { effort_noise: noise, load: &load, ..motion })[0][25];
+        assert!((gear - slope).abs() < 1e-5 && (gear - 1.0).abs() > 0.1, "{gear} and {slope}");
+    }
+    let v = of(0.5 * STILL);
+    let motion = motion(&model, [&q, &v, &tau, &tau, &tau], DT, &still);
+    assert_eq!(plant.gears(&motion)[0], [1.0; 50], "a joint that stands");
+}
+
 /// What friction holds at rest is told from the mean of what is needed: the noise of an encoder's acceleration exceeds it by far.
 #[test]
 fn a_joint_that_slips_at_its_greatest_friction_leaves_the_noise_of_its_acceleration_and_not_its_mean_size() {

@@ -140,6 +140,15 @@ impl Candidate {
         if self.kind.card().body { self.joints.first().copied() } else { None }
     }
 
+    /// Puts the columns of a product about a factor that was found: the leverage of a force that pushes is as great as the force.
+    pub fn stand_about(&mut self, coefficients: &[f64]) {
+        if let (Some(_), Some(force)) = (self.kind.card().pushes, coefficients.first_chunk())
+            && self.force != [0.0; 3]
+        {
+            self.force = *force;
+        }
+    }
+
     /// The knob at which coefficients would put a signature that is a secant: a fit with the knob there comes nearer.
     /// `None` for kinds whose knob is no part of their coefficients.
     pub fn secant(&self, coefficients: &[f64]) -> Option<f64> {

@@ -257,6 +257,7 @@ impl Data<'_> {
             let mut change = 0.0f64;
             for (i, term) in terms.iter_mut().enumerate() {
                 let (_, theta) = fit.own(&problem, i);
+                term.candidate.stand_about(&theta);
                 let entry = &problem.entries[i];
                 let before = term.candidate.shape;
                 if let Some(next) = term.candidate.secant(&theta) {
@@ -324,7 +325,7 @@ mod tests {
     use crate::fit::support::on_data;
     use gapscope_datasets::{Recipe, generate};
     use gapscope_dynamics::robots;
-    use gapscope_effects::{LoadDependentFriction, TorqueBias, TorqueGainError};
+    use gapscope_effects::{ExternalContact, LoadDependentFriction, TorqueBias, TorqueGainError};
 
     /// A gear is loaded by what its drive delivers. By the logged effort, most of which is a bias, the column of this friction
     /// points elsewhere than its torque, and no chord comes to its coefficient.
@@ -347,6 +348,32 @@ mod tests {
         for (c, truth) in [(0, 0.15), (1, 0.2)] {
             let found = fit.own(&problem, c).1[0];
             assert!((found - truth).abs() < 0.003, "{found} and {truth}");
+        }
+    }
+
+    /// The leverage of a push is as great as its force. Columns about a third of it would lead three times as far as the place
+    /// is, and back and forth for ever.
+    #[test]
+    fn where_a_push_acts_is_found_though_its_force_was_known_badly() {
+        let model = robots::model("arm6").unwrap().unwrap().model;
+        let (force, offset) = ([15.0, -10.0, 20.0], [0.03, -0.02, 0.025]);
+        let intervals = vec![[2.0, 4.0], [6.0, 8.5]];
+        let push =
+            ExternalContact { link: model.joints()[5].link.clone(), intervals: intervals.clone(), force, offset };
+        let recipe = Recipe { seconds: 10.0, rate: 250.0, ..Recipe::default() };
+        let log = |seed| {
+            let log = generate(&model, &[Effect::ExternalContact(push.clone())], seed, &recipe, "log").unwrap();
+            Signals { pushed: intervals.clone(), ..Signals::new(&model, &log).unwrap() }
+        };
+        let signals: Vec<Signals> = (1..3).map(log).collect();
+        let known = Candidate { force: force.map(|f| f / 3.0), ..Candidate::new(Kind::ExternalContact, vec![5]) };
+        let (problem, fit) = on_data(&model, &signals, |data| data.refine(&[known], None)).unwrap();
+        let found = fit.own(&problem, 0).1;
+        for (found, truth) in found.iter().zip(force) {
+            assert!((found - truth).abs() < 0.1, "{found} and {truth}");
+        }
+        for (found, truth) in found[3..].iter().zip(offset) {
+            assert!((found - truth).abs() < 0.002, "{found} and {truth}");
         }
     }
 }

@@ -140,6 +140,15 @@ impl Fit {
         }
     }
 
+    /// The square of the step from other coefficients of the same candidates, in standard errors. A tangent's is the step of its
+    /// knob.
+    pub fn step_from(&self, problem: &Problem, others: &[Vec<f64>]) -> f64 {
+        let mut from = self.clone();
+        from.move_to(problem, others, 1.0);
+        let step = DVector::from_iterator(self.theta.len(), self.theta.iter().zip(&from.theta).map(|(a, b)| a - b));
+        step.dot(&(problem.precision(&self.columns) * &step))
+    }
+
     /// The effects, one a kind where the kind has a value per joint. Candidates whose coefficients no physical effect has are
     /// left out. Links may be what no body is: where a search moves on from here, a body that was moved would lead it astray.
     pub fn effects(&self, problem: &Problem, model: &Model) -> Vec<Effect> {

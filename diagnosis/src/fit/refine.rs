@@ -15,10 +15,9 @@ use std::sync::Arc;
 const ROUNDS: usize = 8;
 /// Rounds, at most, where knobs have settled and torque still bends with the coefficients.
 const ROUNDS_FOR_BENT: usize = 20;
-/// Rounds, at least, where some torque bends with the coefficients, ...
-const ROUNDS_OF_BENT: usize = 6;
-/// ... and the change of the misfit, see [`Problem::misfit`], at which it has settled then: a twentieth of a nat. Friction under
-/// load that passes for a gain comes nearer by a part of the way each time.
+/// Change of the misfit, see [`Problem::misfit`], at which torque that bends with the coefficients has settled, and of the square
+/// of the step still to be taken, in standard errors: a twentieth of a nat. Where coefficients are what no body has, the plant
+/// stays at what one has, and a step remains.
 const SETTLED_BENT: f64 = 0.1;
 /// Relative change of a knob at which it has settled.
 const SETTLED: f64 = 2e-3;
@@ -230,7 +229,10 @@ impl Data<'_> {
         let set: Vec<usize> = (0..terms.len()).collect();
         let mut found: Option<Bend> = None;
         let bends = candidates.iter().any(|c| c.kind.card().bends);
-        let mut misfit_before = f64::INFINITY;
+        let settled = |now: f64, before: f64| (now - before).abs() < SETTLED_BENT;
+        let (mut misfit_before, mut step_before) = (f64::INFINITY, f64::INFINITY);
+        // Coefficients about which the problem is bent.
+        let mut about: Option<Vec<Vec<f64>>> = None;
         let turns = candidates.iter().any(Candidate::turns);
         let most = if turns { ROUNDS_OF_TURNING } else { ROUNDS };
         let mut reached: Option<Reached> = None;
@@ -277,12 +279,13 @@ impl Data<'_> {
                 }
             }
             let misfit = problem.misfit(&fit, self.band);
+            let step = about.as_ref().map_or(f64::INFINITY, |about| fit.step_from(&problem, about));
             let still = match &reached {
                 // By the straight line about the point reached there is nothing to be had.
                 Some(last) => last.misfit - misfit < SETTLED_MISFIT,
-                None => !bends || round >= ROUNDS_OF_BENT && (misfit - misfit_before).abs() < SETTLED_BENT,
+                None => !bends || settled(step, step_before) && settled(misfit, misfit_before),
             };
-            misfit_before = misfit;
+            (misfit_before, step_before) = (misfit, step);
             let most = if change < SETTLED && bends { most.max(ROUNDS_FOR_BENT) } else { most };
             if round >= most || (round >= 1 && change < SETTLED && still) {
                 if let Some(last) = &reached {
@@ -313,6 +316,7 @@ impl Data<'_> {
             } else {
                 data.bend(&problem, &at)?
             };
+            about = Some(at.coefficients(&problem));
             found = Some(bend);
             round += 1;
         }

@@ -121,6 +121,11 @@ impl Problem {
         &bread * (meat * factor + prior) * &bread
     }
 
+    /// How sharply all rows, and what was plausible before, tell the coefficients of some columns: the inverse of a covariance.
+    pub fn precision(&self, columns: &[usize]) -> DMatrix<f64> {
+        self.regular(columns, &self.total)
+    }
+
     pub(super) fn regular(&self, columns: &[usize], normal: &Normal) -> DMatrix<f64> {
         let mut gram = DMatrix::from_fn(columns.len(), columns.len(), |i, j| normal.gram[(columns[i], columns[j])]);
         for i in 0..columns.len() {

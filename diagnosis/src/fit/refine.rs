@@ -6,7 +6,7 @@ use crate::fit::plant::{plant_pushed, residual};
 use crate::fit::problem::Problem;
 use crate::fit::terms::Term;
 use crate::record::data::Data;
-use crate::record::signals::Signals;
+use crate::record::signals::{Signals, usual_effort};
 use gapscope_effects::{Candidate, Effect, EffectError, Kind, Motion, Plant};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -175,6 +175,14 @@ impl Data<'_> {
             .collect()
     }
 
+    /// The least knob that a candidate may have in these logs.
+    fn least_knob(&self, candidate: &Candidate) -> f64 {
+        match candidate.joints[..] {
+            [joint] if candidate.kind.card().unit_coefficient => usual_effort(self.signals, joint),
+            _ => 0.0,
+        }
+    }
+
     /// What a fit changes of the residual, and the misfit that the plant has there.
     fn look(&self, problem: &Problem, at: &Fit) -> Result<(Bend, f64), EffectError> {
         let bend = self.bend(problem, at)?;
@@ -268,7 +276,7 @@ impl Data<'_> {
                 } else if let Some((low, high)) = term.candidate.kind.card().turned_by_tangent() {
                     if let (true, Some((by, rest))) = (entry.tangent, theta.split_last()) {
                         let (low, high) = (low * candidates[i].shape, high * candidates[i].shape);
-                        term.candidate.shape = (before + by).clamp(low, high);
+                        term.candidate.shape = (before + by).clamp(low, high).max(self.least_knob(&candidates[i]));
                         term.tangent_at = Some(rest.to_vec());
                         change = change.max((term.candidate.shape / before - 1.0).abs());
                     } else {
@@ -379,5 +387,23 @@ mod tests {
         for (found, truth) in found[3..].iter().zip(offset) {
             assert!((found - truth).abs() < 0.002, "{found} and {truth}");
         }
+    }
+
+    /// An effort that has nothing to do with the motion is best cut away. From one refinement to the next a limit would come down
+    /// to nothing.
+    #[test]
+    fn a_limit_never_cuts_most_of_an_effort() {
+        let model = robots::model("double_pendulum").unwrap().unwrap().model;
+        let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
+        let log = |seed| {
+            let mut log = generate(&model, &[], seed, &recipe, "log").unwrap();
+            log.effort[0].iter_mut().enumerate().for_each(|(k, effort)| *effort += 40.0 * (0.037 * k as f64).sin());
+            Signals::new(&model, &log).unwrap()
+        };
+        let signals: Vec<Signals> = (1..3).map(log).collect();
+        let least = usual_effort(&signals, 0);
+        let limit = Candidate { shape: 1.1 * least, ..Candidate::new(Kind::TorqueSaturation, vec![0]) };
+        let (problem, _) = on_data(&model, &signals, |data| data.refine(&[limit], None)).unwrap();
+        assert_eq!(problem.entries[0].candidate.shape, least);
     }
 }

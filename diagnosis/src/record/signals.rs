@@ -292,6 +292,16 @@ pub fn standstill(signals: &[Signals], joints: usize) -> Vec<f64> {
         .collect()
 }
 
+/// Median size of the effort of a joint, N m or N. A limit below it cuts most of the effort, and explains what it has cut away.
+pub(crate) fn usual_effort(signals: &[Signals], joint: usize) -> f64 {
+    let mut size: Vec<f64> = signals.iter().flat_map(|s| s.effort[joint].iter()).map(|t| t.abs()).collect();
+    if size.is_empty() {
+        return 0.0;
+    }
+    let middle = size.len() / 2;
+    *size.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// Standard deviation of white noise on a smooth signal, from the lesser two thirds of its fourth differences (1, −4, 6, −4, 1).
 /// Of an encoder those are whole counts: their median would be one as well, and be off by up to a third. Where five samples
 /// are the same nothing moved.

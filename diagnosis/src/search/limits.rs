@@ -1,6 +1,7 @@
 //! Limits of a drive's torque: they are cut from the measured effort, and so can explain its noise or what they cut away.
 
 use crate::record::logs::Record;
+use crate::record::signals::usual_effort;
 use gapscope_effects::Range;
 
 /// A torque this many times its noise is no artefact of it: a limit may cut it. It is of limits alone, which take the greatest
@@ -12,20 +13,11 @@ impl Record<'_> {
     /// and a cut of no more than an effort's noise explains that noise by itself.
     pub(crate) fn limits(&self, ranges: &[Range]) -> Vec<std::ops::Range<f64>> {
         let of = |j: usize| {
-            let size: Vec<f64> = self.signals.iter().flat_map(|s| s.effort[j].iter()).map(|t| t.abs()).collect();
             let most = self.signals.iter().flat_map(|s| s.tau[j].iter()).fold(0.0f64, |most, t| most.max(t.abs()));
             let noise = self.signals.iter().map(|s| s.effort_noise[j]).fold(0.0, f64::max);
             let clear = ranges[j].torque > CLEAR_OF_NOISE * noise;
-            median(size)..if clear { f64::INFINITY } else { most - CLEAR_OF_NOISE * noise }
+            usual_effort(&self.signals, j)..if clear { f64::INFINITY } else { most - CLEAR_OF_NOISE * noise }
         };
         (0..self.model.dof()).map(of).collect()
     }
-}
-
-fn median(mut x: Vec<f64>) -> f64 {
-    if x.is_empty() {
-        return 0.0;
-    }
-    let middle = x.len() / 2;
-    *x.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -334,7 +334,7 @@ impl Data<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::support::on_data;
+    use crate::fit::support::{logs, on_data};
     use gapscope_datasets::{Recipe, generate};
     use gapscope_dynamics::robots;
     use gapscope_effects::{ExternalContact, LoadDependentFriction, TorqueBias, TorqueGainError};
@@ -350,9 +350,7 @@ mod tests {
             Effect::TorqueBias(TorqueBias { bias: on([30.0, 20.0]) }),
             Effect::TorqueGainError(TorqueGainError { gain: on([0.9, 1.1]) }),
         ];
-        let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
-        let log = |seed| Signals::new(&model, &generate(&model, &effects, seed, &recipe, "log").unwrap()).unwrap();
-        let signals: Vec<Signals> = (1..4).map(log).collect();
+        let signals = logs(&model, &effects);
         let kinds = [Kind::LoadDependentFriction, Kind::TorqueBias, Kind::TorqueGainError, Kind::CoulombFriction];
         let candidates: Vec<Candidate> =
             kinds.into_iter().flat_map(|kind| (0..2).map(move |j| Candidate::new(kind, vec![j]))).collect();
@@ -372,12 +370,8 @@ mod tests {
         let intervals = vec![[2.0, 4.0], [6.0, 8.5]];
         let push =
             ExternalContact { link: model.joints()[5].link.clone(), intervals: intervals.clone(), force, offset };
-        let recipe = Recipe { seconds: 10.0, rate: 250.0, ..Recipe::default() };
-        let log = |seed| {
-            let log = generate(&model, &[Effect::ExternalContact(push.clone())], seed, &recipe, "log").unwrap();
-            Signals { pushed: intervals.clone(), ..Signals::new(&model, &log).unwrap() }
-        };
-        let signals: Vec<Signals> = (1..3).map(log).collect();
+        let mut signals = logs(&model, &[Effect::ExternalContact(push)]);
+        signals.iter_mut().for_each(|s| s.pushed.clone_from(&intervals));
         let known = Candidate { force: force.map(|f| f / 3.0), ..Candidate::new(Kind::ExternalContact, vec![5]) };
         let (problem, fit) = on_data(&model, &signals, |data| data.refine(&[known], None)).unwrap();
         let found = fit.own(&problem, 0).1;

@@ -9,7 +9,7 @@ use crate::record::known::Known;
 use crate::record::signals::{Signals, standstill};
 use gapscope_datasets::{Recipe, generate};
 use gapscope_dynamics::{Model, robots};
-use gapscope_effects::{Candidate, Kind};
+use gapscope_effects::{Candidate, Effect, Kind};
 
 /// A kind fitted to the first joint of a double pendulum, of logs to which something is done.
 pub(crate) fn fitted(kind: Kind, done: impl Fn(&mut Signals)) -> (Vec<Signals>, Band, Problem, Fit) {
@@ -19,14 +19,8 @@ pub(crate) fn fitted(kind: Kind, done: impl Fn(&mut Signals)) -> (Vec<Signals>, 
 /// The same of some candidates.
 pub(crate) fn fitted_as(candidates: Vec<Candidate>, done: impl Fn(&mut Signals)) -> (Vec<Signals>, Band, Problem, Fit) {
     let model = robots::model("double_pendulum").unwrap().unwrap().model;
-    let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
-    let signals: Vec<Signals> = (1..4)
-        .map(|seed| {
-            let mut s = Signals::new(&model, &generate(&model, &[], seed, &recipe, "log").unwrap()).unwrap();
-            done(&mut s);
-            s
-        })
-        .collect();
+    let mut signals = logs(&model, &[]);
+    signals.iter_mut().for_each(done);
     let (band, problem, fit) = on_data(&model, &signals, |data| {
         let terms: Vec<Term> = candidates.into_iter().map(|candidate| Term { candidate, tangent_at: None }).collect();
         let all: Vec<usize> = (0..terms.len()).collect();
@@ -36,6 +30,12 @@ pub(crate) fn fitted_as(candidates: Vec<Candidate>, done: impl Fn(&mut Signals))
         (data.band.clone(), problem, fit)
     });
     (signals, band, problem, fit)
+}
+
+/// Three logs of a robot with some effects.
+pub(crate) fn logs(model: &Model, effects: &[Effect]) -> Vec<Signals> {
+    let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
+    (1..4).map(|seed| Signals::new(model, &generate(model, effects, seed, &recipe, "log").unwrap()).unwrap()).collect()
 }
 
 /// What is made of the data of some logs whose joints all move, with noise of a thousandth.

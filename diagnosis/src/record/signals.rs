@@ -6,6 +6,7 @@
 //! position when logs are read, not used here.
 
 use crate::numbers::kernel::{Kernel, apply};
+use crate::numbers::quantile::quantile;
 use gapscope_datasets::{Episode, Uniform, resample};
 use gapscope_dynamics::{Data, Model};
 use gapscope_effects::{Held, Motion};
@@ -294,12 +295,8 @@ pub fn standstill(signals: &[Signals], joints: usize) -> Vec<f64> {
 
 /// Median size of the effort of a joint, N m or N. A limit below it cuts most of the effort, and explains what it has cut away.
 pub(crate) fn usual_effort(signals: &[Signals], joint: usize) -> f64 {
-    let mut size: Vec<f64> = signals.iter().flat_map(|s| s.effort[joint].iter()).map(|t| t.abs()).collect();
-    if size.is_empty() {
-        return 0.0;
-    }
-    let middle = size.len() / 2;
-    *size.select_nth_unstable_by(middle, f64::total_cmp).1
+    let size: Vec<f64> = signals.iter().flat_map(|s| s.effort[joint].iter()).map(|t| t.abs()).collect();
+    quantile(&size, 0.5)
 }
 
 /// Standard deviation of white noise on a smooth signal, from the lesser two thirds of its fourth differences (1, −4, 6, −4, 1).

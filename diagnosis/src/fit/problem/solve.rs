@@ -114,7 +114,7 @@ impl Problem {
     fn sandwich(&self, columns: &[usize], scores: &[DVector<f64>]) -> DMatrix<f64> {
         let (m, used) = (columns.len(), scores.len());
         let meat = scores.iter().fold(DMatrix::zeros(m, m), |meat, score| meat + score * score.transpose());
-        let bread = Factor::new(&self.regular(columns, &self.total)).map(|c| c.inverse());
+        let bread = Factor::new(&self.precision(columns)).map(|c| c.inverse());
         let Some(bread) = bread else { return DMatrix::from_element(m, m, f64::INFINITY) };
         let factor = if used > 1 { used as f64 / (used - 1) as f64 } else { f64::INFINITY };
         let prior = DMatrix::from_diagonal(&DVector::from_fn(m, |i, _| self.prior[columns[i]]));

@@ -5,7 +5,6 @@ use crate::fit::estimate::Fit;
 use crate::fit::support;
 use crate::record::data::Data;
 use crate::record::signals::standstill;
-use gapscope_datasets::{Recipe, generate};
 use gapscope_effects::Kind;
 
 #[test]
@@ -44,10 +43,7 @@ fn a_constant_effort_does_not_make_a_joint_more_tolerant() {
 #[test]
 fn columns_are_slopes_of_the_plant_behind_gears_and_drives() {
     let model = gapscope_dynamics::robots::model("double_pendulum").unwrap().unwrap().model;
-    let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
-    let signals: Vec<Signals> = (1..3)
-        .map(|seed| Signals::new(&model, &generate(&model, &[], seed, &recipe, "log").unwrap()).unwrap())
-        .collect();
+    let signals = support::logs(&model, &[]);
     let found = [
         (Kind::TorqueGainError, 0.25),
         (Kind::LoadDependentFriction, 0.2),
@@ -96,8 +92,7 @@ fn columns_are_slopes_of_the_plant_behind_gears_and_drives() {
                 }
             }
             let kind = problem.entries.iter().find(|e| e.columns.contains(&column)).map(|e| e.candidate.kind);
-            // A row about a reversal of the load is a mean of two slopes.
-            // In this plane some moments have no torque.
+            // A row about a reversal of the load is a mean of two slopes, and in this plane some moments have no torque.
             assert!(
                 off < 0.05f64.powi(2) * square + 1e-9,
                 "{kind:?} {column}: {} of {} off",

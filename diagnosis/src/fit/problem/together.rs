@@ -27,7 +27,7 @@ impl Problem {
         if scores.len() < 2 {
             return None;
         }
-        let regular = self.regular(columns, &self.total);
+        let regular = self.precision(columns);
         let unit = DVector::from_fn(columns.len(), |i, _| regular[(i, i)].sqrt().recip());
         let scaled = DMatrix::from_fn(columns.len(), columns.len(), |i, j| unit[i] * regular[(i, j)] * unit[j]);
         let lower = Cholesky::new(scaled)?.unpack();

@@ -102,7 +102,7 @@ impl Record<'_> {
         progress("held-out rollouts", 0.7);
         let before = self.nominal();
         let after = self.held_out(problem, &fit.set)?;
-        let final_residuals = self.data(&chosen.noise).rest(problem, fit)?;
+        let final_residuals = self.rest(chosen)?;
         progress("networks", 0.8);
         let learned = learner::learn(&self.signals, &self.band, &weights, &before.rows, &after.rows);
         let mut floor = noise_floor(&self.signals, &self.band, &final_residuals, model.dof());

@@ -3,6 +3,7 @@
 use crate::check::Logs;
 use crate::robust::rms;
 use gapscope_dynamics::{Data, Model};
+use rayon::prelude::*;
 
 /// Places looked at over all logs, however long they are.
 const PLACES: usize = 420;
@@ -78,7 +79,7 @@ impl Sample {
     }
 
     /// Mean effort under the tents, each moved `later(log)` seconds.
-    pub fn effort_after(&self, logs: &Logs, later: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
+    pub fn effort_after(&self, logs: &Logs, later: impl Fn(usize) -> f64 + Sync) -> Vec<Vec<f64>> {
         let of = |j: usize| {
             let at = |(tent, &e): (&[f64; 3], &usize)| {
                 let episode = logs.episodes[e];
@@ -89,7 +90,7 @@ impl Sample {
             };
             self.tents.iter().zip(&self.log).map(at).collect()
         };
-        (0..logs.model.dof()).map(of).collect()
+        (0..logs.model.dof()).into_par_iter().map(of).collect()
     }
 
     /// Number of places.

@@ -212,7 +212,7 @@ impl Clocks<'_> {
 
     /// The shift of some logs at its greatest likelihood. The first look lets friction be anything, which moves a shift; a robot's
     /// own friction does not.
-    fn refined(&self, best: f64, bar: Bar, of: impl Fn(usize) -> bool) -> Option<f64> {
+    fn refined(&self, best: f64, bar: Bar, of: impl Fn(usize) -> bool + Sync) -> Option<f64> {
         let (longest, step) = self.range(bar);
         let at = |later: f64| {
             let moved = self.moved(|e| if of(e) { later } else { 0.0 });
@@ -230,7 +230,7 @@ impl Clocks<'_> {
     }
 
     /// The sample with efforts so much later in each log.
-    fn moved(&self, later: impl Fn(usize) -> f64) -> Sample {
+    fn moved(&self, later: impl Fn(usize) -> f64 + Sync) -> Sample {
         let mut moved = self.sample.clone();
         let effort = self.sample.effort_after(self.logs, later);
         self.group().for_each(|j| moved.effort[j].clone_from(&effort[j]));

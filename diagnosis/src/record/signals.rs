@@ -166,12 +166,6 @@ impl Signals {
         (0..taken.len()).map(|k| (at(k + 1) - at(k.saturating_sub(1))) / (2.0 * self.dt)).collect()
     }
 
-    /// Whether something outside may be about to push or to let go at sample `k`.
-    fn pushed_in_part(&self, k: usize) -> bool {
-        let time = self.time(k);
-        self.pushed.iter().flatten().any(|edge| (time - edge).abs() < EDGE)
-    }
-
     /// The samples at which a joint rests and bears nothing but what its drive does. Friction hides when a push begins and
     /// ends, so that no rest of a log with pushes tells.
     pub fn rests(&self, joint: usize, standstill: f64) -> Vec<bool> {
@@ -185,9 +179,21 @@ impl Signals {
         let wide = (self.held.len() as f64 / 2.0 - 1.0) * self.raw.dt - DERIVATIVE_HALF_WIDTH;
         // The sample beside a rest shares its differences with it.
         let reach = (wide / self.dt).round().max(1.0) as usize;
-        let near = |k: usize| stands[k.saturating_sub(reach)..(k + reach + 1).min(stands.len())].contains(&true);
-        let pushes = !self.pushed.is_empty();
-        (0..stands.len()).map(|k| !(near(k) || pushes && self.pushed_in_part(k))).collect()
+        let mut slides = vec![true; stands.len()];
+        // A stretch at a time: each sample is written once, however wide the reach.
+        let mut written = 0;
+        for k in (0..stands.len()).filter(|&k| stands[k]) {
+            let end = (k + reach + 1).min(slides.len());
+            slides[written.max(k.saturating_sub(reach))..end].fill(false);
+            written = end;
+        }
+        // Something outside may be about to push or to let go.
+        for edge in self.pushed.iter().flatten() {
+            let first = ((edge - 2.0 * EDGE) / self.raw.dt - self.first as f64) / self.stride as f64;
+            let about = (first.max(0.0) as usize..slides.len()).take_while(|&k| self.time(k) < edge + 2.0 * EDGE);
+            about.filter(|&k| (self.time(k) - edge).abs() < EDGE).for_each(|k| slides[k] = false);
+        }
+        slides
     }
 
     /// Gravity as it was found, m/s² in the frame of the base; the model's where nothing is known of it.

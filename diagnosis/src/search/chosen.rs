@@ -7,6 +7,7 @@ use crate::record::data::Data;
 use crate::search::climb;
 use crate::search::climb::{Choice, Competition};
 use gapscope_effects::{Candidate, EffectError, Kind};
+use std::sync::{Arc, OnceLock};
 
 /// What an account leaves: `[episode][joint][signal]`, N m or N.
 pub(crate) type Rest = Vec<Vec<Vec<f64>>>;
@@ -32,6 +33,8 @@ pub(crate) struct Chosen {
     pub tried: Vec<(Candidate, f64)>,
     /// By how many nats the logs, held against the exact law, speak for each kind that was held so.
     pub needed: Vec<(Kind, f64)>,
+    /// What `exact` at `fit` leaves of the logs, once it was asked for, see [`Record::rest`](crate::record::logs::Record::rest).
+    pub rest: OnceLock<Arc<Rest>>,
 }
 
 /// A drive that turns on its own.
@@ -83,6 +86,7 @@ impl Chosen {
             late_doubt: None,
             tried: self.tried.clone(),
             needed: self.needed.clone(),
+            rest: OnceLock::new(),
         }
     }
 

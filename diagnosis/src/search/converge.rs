@@ -10,6 +10,7 @@ use crate::search::chosen::{Chosen, Turned};
 use crate::search::climb;
 use crate::search::climb::Choice;
 use gapscope_effects::{Candidate, EffectError, Kind};
+use std::sync::OnceLock;
 
 /// Times that the choice is made, each around the exact parameters of the one before.
 const ROUNDS: usize = 4;
@@ -54,7 +55,8 @@ impl Record<'_> {
             }
         };
         let (late_doubt, tried, needed) = (None, Vec::new(), Vec::new());
-        Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt, tried, needed })
+        let rest = OnceLock::new();
+        Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt, tried, needed, rest })
     }
 
     /// Puts all candidates around a set at its exact law: knobs turned, gears loaded, and what bends taken into account.

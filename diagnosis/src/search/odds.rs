@@ -3,6 +3,7 @@
 use crate::record::logs::Record;
 use crate::search::chosen::{Chosen, Rest};
 use gapscope_effects::EffectError;
+use std::sync::Arc;
 
 /// What joints bear at rest beyond friction: `[joint][row]`, N m or N.
 type Borne = Vec<Vec<Option<f64>>>;
@@ -36,8 +37,12 @@ impl Chosen {
 
 impl Record<'_> {
     /// What an account leaves of every run.
-    pub(crate) fn rest(&self, chosen: &Chosen) -> Result<Rest, EffectError> {
-        self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)
+    pub(crate) fn rest(&self, chosen: &Chosen) -> Result<Arc<Rest>, EffectError> {
+        if let Some(rest) = chosen.rest.get() {
+            return Ok(rest.clone());
+        }
+        let rest = Arc::new(self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?);
+        Ok(chosen.rest.get_or_init(|| rest).clone())
     }
 
     /// What joints bear at rest beyond friction.

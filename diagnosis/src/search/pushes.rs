@@ -79,7 +79,7 @@ impl Record<'_> {
         for e in problem.entries.iter().filter(holds_still) {
             e.candidate.joints.iter().for_each(|&j| holds[j] += theta[e.columns.start].abs());
         }
-        let torque = |s: &Signals, keep: &dyn Fn(&&Entry) -> bool| {
+        let torque = |s: &Signals, keep: &(dyn Fn(&&Entry) -> bool + Sync)| {
             let motion = Motion { pushed: &[[f64::NEG_INFINITY, f64::INFINITY]], ..s.motion(self.model, &self.still) };
             let mut torque = vec![vec![0.0; s.len()]; n];
             for e in problem.entries.iter().filter(keep) {
@@ -101,8 +101,8 @@ impl Record<'_> {
             let rests = |j: usize| s.v[j].iter().map(|v| f64::from(u8::from(v.abs() < self.still[j]))).collect();
             (0..n).map(rests).collect()
         };
-        let at_rows = |of: &dyn Fn(&Signals) -> Vec<Vec<f64>>| {
-            rows::at_rows(&self.band, &self.signals.iter().map(of).collect::<Vec<_>>(), n)
+        let at_rows = |of: &(dyn Fn(&Signals) -> Vec<Vec<f64>> + Sync)| {
+            rows::at_rows(&self.band, &self.signals.par_iter().map(of).collect::<Vec<_>>(), n)
         };
         let (rest, still) = (at_rows(&rest), at_rows(&still));
         let always = at_rows(&|s| torque(s, &pushes));

@@ -12,7 +12,7 @@ impl Record<'_> {
     /// rest of a joint that leaves rest too fast shows in what it bears there, and in no row of its motion.
     pub(crate) fn sticking(&self, chosen: Chosen) -> Result<Chosen, EffectError> {
         let of = |c: usize| &chosen.all.entries[c].candidate;
-        let rest = self.data(&chosen.noise).rest(&chosen.exact, &chosen.fit)?;
+        let rest = self.rest(&chosen)?;
         let bears = |c: usize| {
             let bears = |j: &usize| {
                 let beyond = OUTLIER.get() * chosen.exact.sigma[*j];

@@ -96,15 +96,16 @@ impl Scene {
         let every = total / most as f64;
         let (mut time, mut frames, mut offset, mut next) = (vec![], vec![], 0.0, 0.0);
         for episode in episodes {
+            let dt = episode.dt();
             for k in 0..episode.len() {
-                let at = offset + k as f64 * episode.dt();
+                let at = offset + k as f64 * dt;
                 if at >= next {
                     time.push(at);
                     frames.push(skeleton.at(&sample(&episode.position, k)));
                     next = at + every;
                 }
             }
-            offset += episode.len() as f64 * episode.dt();
+            offset += episode.len() as f64 * dt;
         }
         let parents = model.joints().iter().map(|joint| joint.parent).collect();
         let joints = model.joints().iter().map(|joint| joint.name.clone()).collect();

@@ -166,7 +166,7 @@ impl Record<'_> {
     /// Joints of which a choice leaves more than noise, those with most of it first.
     fn restless(&self, chosen: &Chosen) -> Result<Vec<usize>, EffectError> {
         let (exact, fit) = (&chosen.exact, &chosen.fit);
-        let rest = self.data(&chosen.noise).rest(exact, fit)?;
+        let rest = self.rest(chosen)?;
         let floor = noise_floor(&self.signals, &self.band, &rest, self.model.dof());
         // Play shows for moments alone: what it leaves then counts in full.
         let left = exact.left(fit);

@@ -10,11 +10,13 @@ use crate::search::chosen::{Chosen, Turned};
 use crate::search::climb::Choice;
 use crate::search::converge::weighing;
 use crate::search::drive::Account;
-use gapscope_effects::{Candidate, EffectError, Place};
+use gapscope_effects::{Candidate, EffectError, Force, Place};
 use rayon::prelude::*;
 
-/// Accounts of drives that are turned: of those likelier than a rigid drive, the likeliest. One goes on.
+/// Accounts of drives that are turned: the likeliest, and those alone that are less likely than a rigid drive by no more than this,
+/// nats. Before it is turned, an account beside links that are off says little. One goes on.
 const ACCOUNTS: usize = 2;
+const WORTH_A_TURN: f64 = 60.0;
 /// Turns that a drive and what stands beside it take, at most, and the fall of the misfit that is worth another.
 const TURNS: usize = 6;
 const TURN_LEAVES: f64 = 10.0;
@@ -68,18 +70,29 @@ impl Record<'_> {
         Ok(Chosen { turned, tried, ..best })
     }
 
-    /// What was found without the laws of joints beyond calibration, and the joints of those laws that are restless then: a law of a
-    /// joint may stand in for its drive. Nothing where no such law was found.
+    /// What was found with calibration in the place of laws of joints beyond it, and the joints of those laws that are restless
+    /// then: a law of a joint may stand in for its drive. Nothing where no such law was found.
     fn without_laws_of_joints(&self, found: &Chosen) -> Result<Option<(Chosen, Vec<usize>)>, EffectError> {
         let candidate = |c: usize| &found.all.entries[c].candidate;
         let is_law = |c: &usize| {
             let kind = candidate(*c).kind;
-            !kind.is_calibration() && kind.card().place == Place::Joint
+            // A constant force stands in for no drive.
+            let moves = kind.card().force != Some(Force::Constant);
+            !kind.is_calibration() && kind.card().place == Place::Joint && moves
         };
-        let (laws, set): (Vec<usize>, Vec<usize>) = found.choice.set.iter().partition(|c| is_law(c));
+        let (laws, rest): (Vec<usize>, Vec<usize>) = found.choice.set.iter().partition(|c| is_law(c));
         if laws.is_empty() {
             return Ok(None);
         }
+        // A friction that was there has its part of the friction that is.
+        let in_its_place = |c: &usize| {
+            let kind = candidate(*c).kind;
+            let there = laws.iter().any(|law| candidate(*law).joints == candidate(*c).joints);
+            there && kind.is_calibration() && kind.card().place == Place::Joint
+        };
+        let mut set: Vec<usize> = (0..found.all.entries.len()).filter(in_its_place).chain(rest).collect();
+        set.sort_unstable();
+        set.dedup();
         let (exact, fit) = self.data(&found.noise).exact(&found.all, &set, None)?;
         let without = found.with(Choice { set }, exact, fit);
         let mut joints = self.restless(&without)?;
@@ -97,17 +110,19 @@ impl Record<'_> {
         progress: Progress<'_>,
     ) -> Result<(Option<Chosen>, Tried), EffectError> {
         let accounts = self.likelier(rigid, joints, through)?;
-        let (likelier, others) = accounts.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > 0.0);
-        let others = others.into_iter().filter_map(|(chosen, odds)| Some((chosen.turned?.drive, odds))).collect();
+        let (near, far) = accounts.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > -WORTH_A_TURN);
         let turned = |(beside, _): (Chosen, f64)| {
             let beside = self.turned(beside, through)?;
             let odds = beside.odds_against(rigid, self)?;
             Ok((beside, odds))
         };
-        let likelier: Vec<_> = likelier.into_iter().take(ACCOUNTS).collect();
-        let mut turned = likelier.into_par_iter().map(turned).collect::<Result<Vec<_>, EffectError>>()?;
+        let near: Vec<_> = near.into_iter().take(ACCOUNTS).collect();
+        let mut turned = near.into_par_iter().map(turned).collect::<Result<Vec<_>, EffectError>>()?;
         turned.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let Some((beside, _)) = turned.into_iter().next() else { return Ok((None, others)) };
+        let (likelier, less) = turned.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > 0.0);
+        let others = less.into_iter().chain(far);
+        let others = others.filter_map(|(chosen, odds)| Some((chosen.turned?.drive, odds))).collect();
+        let Some((beside, _)) = likelier.into_iter().next() else { return Ok((None, others)) };
         // Beside what was found as it is, and with the choice made again around it.
         let Chosen { all, choice, noise, turned, .. } = beside.clone();
         let next = self.converge(all, choice, noise, turned, progress)?;

@@ -7,6 +7,7 @@ use crate::numbers::decide::FLOOR_KNOWN_TO;
 use crate::record::floor::noise_floor;
 use crate::record::logs::{Progress, Record};
 use crate::search::chosen::{Chosen, Turned};
+use crate::search::climb;
 use crate::search::climb::Choice;
 use crate::search::converge::weighing;
 use crate::search::drive::Account;
@@ -88,9 +89,11 @@ impl Record<'_> {
         let in_its_place = |c: &usize| {
             let kind = candidate(*c).kind;
             let there = laws.iter().any(|law| candidate(*law).joints == candidate(*c).joints);
-            there && kind.is_calibration() && kind.card().place == Place::Joint
+            let taken = rest.iter().any(|&own| climb::excludes(&found.all, own, *c));
+            there && !taken && kind.is_calibration() && kind.card().place == Place::Joint
         };
-        let mut set: Vec<usize> = (0..found.all.entries.len()).filter(in_its_place).chain(rest).collect();
+        let mut set: Vec<usize> =
+            (0..found.all.entries.len()).filter(in_its_place).chain(rest.iter().copied()).collect();
         set.sort_unstable();
         set.dedup();
         let (exact, fit) = self.data(&found.noise).exact(&found.all, &set, None)?;

@@ -12,8 +12,8 @@ use gapscope_effects::{EffectError, Kind};
 /// Times that a likelier account takes the place of what was chosen.
 const AGAIN: usize = 2;
 /// A kind without which the logs are less likely by no more than this, nats, is looked at again: what was chosen around it may
-/// have been chosen because of it. More of it takes more time.
-const DOUBTFUL: f64 = 60.0;
+/// have been chosen because of it. So is a drive that is less likely by no more. More of it takes more time.
+pub(crate) const DOUBTFUL: f64 = 60.0;
 
 impl Record<'_> {
     /// The likeliest account: where the best one without a kind is likelier than what was chosen, that one.

@@ -11,13 +11,13 @@ use crate::search::climb;
 use crate::search::climb::Choice;
 use crate::search::converge::weighing;
 use crate::search::drive::Account;
+use crate::search::needed::DOUBTFUL;
 use gapscope_effects::{Candidate, EffectError, Force, Place};
 use rayon::prelude::*;
 
-/// Accounts of drives that are turned: the likeliest, and those alone that are less likely than a rigid drive by no more than this,
-/// nats. Before it is turned, an account beside links that are off says little. One goes on.
+/// Accounts of drives that are turned: the likeliest of those that are not far less likely than a rigid drive. Before it is turned,
+/// an account beside links that are off says little. One goes on.
 const ACCOUNTS: usize = 2;
-const WORTH_A_TURN: f64 = 60.0;
 /// Turns that a drive and what stands beside it take, at most, and the fall of the misfit that is worth another.
 const TURNS: usize = 6;
 const TURN_LEAVES: f64 = 10.0;
@@ -78,8 +78,8 @@ impl Record<'_> {
         let is_law = |c: &usize| {
             let kind = candidate(*c).kind;
             // A constant force stands in for no drive.
-            let moves = kind.card().force != Some(Force::Constant);
-            !kind.is_calibration() && kind.card().place == Place::Joint && moves
+            let constant = kind.card().force == Some(Force::Constant);
+            !kind.is_calibration() && kind.card().place == Place::Joint && !constant
         };
         let (laws, rest): (Vec<usize>, Vec<usize>) = found.choice.set.iter().partition(|c| is_law(c));
         if laws.is_empty() {
@@ -113,7 +113,7 @@ impl Record<'_> {
         progress: Progress<'_>,
     ) -> Result<(Option<Chosen>, Tried), EffectError> {
         let accounts = self.likelier(rigid, joints, through)?;
-        let (near, far) = accounts.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > -WORTH_A_TURN);
+        let (near, far) = accounts.into_iter().partition::<Vec<_>, _>(|(_, odds)| *odds > -DOUBTFUL);
         let turned = |(beside, _): (Chosen, f64)| {
             let beside = self.turned(beside, through)?;
             let odds = beside.odds_against(rigid, self)?;

@@ -28,7 +28,9 @@ pub fn power(model: &Model, problem: &Problem, set: &[usize], drives: &[Least]) 
     }
     places.sort();
     places.dedup();
-    let linear = places.into_iter().flat_map(|(order, joints)| sizes(model, problem, set, Kind::ALL[order], joints));
+    let competition = Competition::new(problem);
+    let linear =
+        places.into_iter().flat_map(|(order, joints)| sizes(model, &competition, set, Kind::ALL[order], joints));
     let mut power: Vec<Power> = linear.chain(drives.iter().map(|least| of_drive(model, least))).collect();
     power.sort_by_key(|power| Kind::ALL.iter().position(|kind| kind.name() == power.kind));
     power
@@ -55,7 +57,8 @@ fn named(model: &Model, kind: Kind, joints: &[usize], parameter: &str, size: Opt
 }
 
 /// The least sizes of one kind at one place.
-fn sizes(model: &Model, problem: &Problem, set: &[usize], kind: Kind, joints: &[usize]) -> Vec<Power> {
+fn sizes(model: &Model, competition: &Competition<'_>, set: &[usize], kind: Kind, joints: &[usize]) -> Vec<Power> {
+    let problem = competition.problem;
     let mut here: Vec<usize> = (0..problem.entries.len())
         .filter(|&c| problem.entries[c].candidate.kind == kind && problem.entries[c].candidate.joints == joints)
         .collect();
@@ -65,7 +68,7 @@ fn sizes(model: &Model, problem: &Problem, set: &[usize], kind: Kind, joints: &[
     let card = kind.card();
     if let Size::Knob(parameter, units) = card.size {
         // The knob is the size: the greatest limit of the grid that cuts enough away.
-        let seen = |&&c: &&usize| least(problem, set, c, &[1.0], false).is_some_and(|least| least <= 1.0);
+        let seen = |&&c: &&usize| least(competition, set, c, &[1.0], false).is_some_and(|least| least <= 1.0);
         let limit = here.iter().rev().find(seen).map(|&c| problem.entries[c].candidate.shape);
         return vec![named(parameter, limit, unit(model, joints, units))];
     }
@@ -81,7 +84,7 @@ fn sizes(model: &Model, problem: &Problem, set: &[usize], kind: Kind, joints: &[
     };
     (gauges.iter())
         .map(|gauge| {
-            let theta = least(problem, set, c, gauge.direction, gauge.beside_others)
+            let theta = least(competition, set, c, gauge.direction, gauge.beside_others)
                 // The alignment takes up half a sample of any delay.
                 .map(|theta| if late { theta + problem.bounds[0].1 } else { theta });
             let coefficients: Vec<f64> = gauge.direction.iter().map(|x| x * theta.unwrap_or(1.0)).collect();
@@ -108,7 +111,14 @@ fn point_mass(model: &Model, candidate: &Candidate) -> [f64; 10] {
 
 /// The least multiple of a direction of a candidate's coefficients at which the selection names it beside a set; `None`
 /// where the logs do not show it.
-fn least(problem: &Problem, set: &[usize], c: usize, direction: &[f64], beside_others: bool) -> Option<f64> {
+fn least(
+    competition: &Competition<'_>,
+    set: &[usize],
+    c: usize,
+    direction: &[f64],
+    beside_others: bool,
+) -> Option<f64> {
+    let problem = competition.problem;
     let others: Vec<usize> = set.iter().copied().filter(|&other| other != c && !excludes(problem, other, c)).collect();
     let with: Vec<usize> = others.iter().copied().chain([c]).collect();
     let own: Vec<usize> = problem.entries[c].columns.clone().collect();
@@ -128,7 +138,6 @@ fn least(problem: &Problem, set: &[usize], c: usize, direction: &[f64], beside_o
     if gain.is_nan() || gain <= ROUNDING * direction.dot(&(&gram * &direction)) {
         return None;
     }
-    let competition = Competition::new(problem);
     let price = competition.prior(&others) - competition.prior(&with) + problem.occam(&own, &information);
     // Half of the deviance is a nat.
     Some((2.0 * price.max(TWENTY_TO_ONE.get()) / gain).sqrt())

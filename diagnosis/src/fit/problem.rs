@@ -249,6 +249,11 @@ impl Problem {
         self.blocks.iter().filter(|b| b.square > 0.0).count()
     }
 
+    /// All columns, those of no candidate first.
+    pub fn all_columns(&self) -> Vec<usize> {
+        (0..self.bounds.len()).collect()
+    }
+
     /// Columns of a set of candidates, the alignment first, unless an effect of the set says how late the effort acts.
     pub fn columns(&self, set: &[usize]) -> Vec<usize> {
         let late = |&c: &usize| self.entries[c].candidate.kind.card().is_late();

@@ -61,7 +61,7 @@ pub struct Account<'a> {
 
 /// The competition on one problem.
 pub struct Competition<'a> {
-    problem: &'a Problem,
+    pub problem: &'a Problem,
     /// The score at the noise that the problem is weighed by.
     pub(super) score: Score<'a>,
     pub(super) columns: Vec<Range<usize>>,

@@ -165,7 +165,7 @@ impl Problem {
                 evidence.held_out[block(row)] += nats;
             }
         }
-        let score = self.score().at(evidence.noise.clone());
+        let score = self.score_of(&fit.columns, evidence.noise.clone());
         // The coefficients are those of the fit, which knows more bounds than each its own.
         let far: f64 = fit.columns.iter().zip(&fit.theta).map(|(&c, t)| (t / score.spread[c]).powi(2)).sum();
         evidence.occam = score.solve(&fit.columns).map_or(f64::NEG_INFINITY, |solved| solved.occam - 0.5 * far);

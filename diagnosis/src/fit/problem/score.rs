@@ -25,6 +25,8 @@ pub struct Score<'a> {
     problem: &'a Problem,
     /// Variance of the rows of each joint, (N m)² or N².
     noise: Vec<f64>,
+    /// Where each column of the problem stands in `gram` and `moment`; `usize::MAX` for those that are left out.
+    place: Vec<usize>,
     gram: DMatrix<f64>,
     moment: DVector<f64>,
     square: f64,
@@ -66,21 +68,25 @@ impl Solved {
 impl Problem {
     /// The score of any set of this problem as it is weighed and bent now, at the noise that it is weighed by.
     pub fn score(&self) -> Score<'_> {
-        let p = self.bounds.len();
-        let spread: Vec<f64> = (0..p).map(|c| self.spread_of(c)).collect();
+        self.score_of(&self.all_columns(), self.sigma.iter().map(|s| s * s).collect())
+    }
+
+    /// The score of any set of some columns, at a noise of each joint, (N m)² or N².
+    pub fn score_of(&self, columns: &[usize], noise: Vec<f64>) -> Score<'_> {
+        let spread: Vec<f64> = (0..self.bounds.len()).map(|c| self.spread_of(c)).collect();
         let bounds = self.bounds.iter().zip(&spread).map(|((low, high), s)| (low / s, high / s)).collect();
-        let noise = self.sigma.iter().map(|s| s * s).collect();
         let empty = Score {
             problem: self,
             noise: Vec::new(),
-            gram: DMatrix::zeros(p, p),
-            moment: DVector::zeros(p),
+            place: Vec::new(),
+            gram: DMatrix::zeros(0, 0),
+            moment: DVector::zeros(0),
             square: 0.0,
             level: 0.0,
             bounds,
             spread,
         };
-        empty.at(noise)
+        empty.at_some(noise, columns)
     }
 
     /// What some columns cost a set by their coefficients alone, nats, from the information that the set leaves in them.
@@ -115,69 +121,66 @@ impl Problem {
 impl<'a> Score<'a> {
     /// The same at another noise.
     pub fn at(&self, noise: Vec<f64>) -> Score<'a> {
-        self.at_some(noise, &|_| true)
+        self.at_some(noise, &self.problem.all_columns())
     }
 
     /// The same at another noise, for some columns alone.
-    fn at_some(&self, noise: Vec<f64>, wanted: &dyn Fn(usize) -> bool) -> Score<'a> {
+    fn at_some(&self, noise: Vec<f64>, columns: &[usize]) -> Score<'a> {
         let problem = self.problem;
-        let p = self.spread.len();
+        let p = columns.len();
+        let mut place = vec![usize::MAX; self.spread.len()];
+        columns.iter().enumerate().for_each(|(i, &c)| place[c] = i);
         let mut next = Score {
+            problem,
+            noise,
+            place,
             gram: DMatrix::zeros(p, p),
             moment: DVector::zeros(p),
             square: 0.0,
             level: 0.0,
-            noise,
-            ..self.clone_frame()
+            bounds: self.bounds.clone(),
+            spread: self.spread.clone(),
         };
         for (j, normal) in problem.normals.iter().enumerate() {
             let unit = 1.0 / (next.noise[j] * problem.correlation[j]);
             next.square += unit * normal.square;
             next.level -= 0.5 * normal.rows / problem.correlation[j] * next.noise[j].ln();
-            let columns: Vec<(usize, usize)> =
-                problem.joints[j].columns.iter().copied().enumerate().filter(|(_, c)| wanted(*c)).collect();
-            for (i, &(a, ca)) in columns.iter().enumerate() {
-                let own = unit * self.spread[ca];
-                next.moment[ca] += own * normal.moment[a];
-                // Columns ascend, so that this is the half below the diagonal.
-                for &(b, cb) in &columns[i..] {
-                    next.gram[(cb, ca)] += own * self.spread[cb] * normal.gram[(b, a)];
+            // Where a column stands among the joint's and in the whole, and its spread.
+            let own: Vec<(usize, usize, f64)> = (problem.joints[j].columns.iter().enumerate())
+                .map(|(at, &c)| (at, next.place[c], self.spread[c]))
+                .filter(|(_, place, _)| *place < usize::MAX)
+                .collect();
+            for (i, &(a, row, spread)) in own.iter().enumerate() {
+                let size = unit * spread;
+                next.moment[row] += size * normal.moment[a];
+                for &(b, other, spread) in &own[i..] {
+                    next.gram[(row.max(other), row.min(other))] += size * spread * normal.gram[(b, a)];
                 }
             }
         }
-        let used: Vec<usize> = (0..p).filter(|c| wanted(*c)).collect();
-        for (i, &a) in used.iter().enumerate() {
-            for &b in &used[i + 1..] {
-                next.gram[(a, b)] = next.gram[(b, a)];
-            }
-        }
+        next.gram.fill_upper_triangle_with_lower_triangle();
         next
     }
 
-    fn clone_frame(&self) -> Score<'a> {
-        Score {
-            problem: self.problem,
-            noise: Vec::new(),
-            gram: DMatrix::zeros(0, 0),
-            moment: DVector::zeros(0),
-            square: 0.0,
-            level: 0.0,
-            bounds: self.bounds.clone(),
-            spread: self.spread.clone(),
-        }
+    /// The entry of two columns in the normal equations.
+    fn gram(&self, a: usize, b: usize) -> f64 {
+        self.gram[(self.place[a], self.place[b])]
+    }
+
+    /// The right side of a column.
+    fn moment(&self, column: usize) -> f64 {
+        self.moment[self.place[column]]
     }
 
     /// The noise that fits a set best (expectation maximisation), (N m)² or N² a joint, and the set solved there.
     pub fn settle(&self, columns: &[usize]) -> Option<(Vec<f64>, Solved)> {
-        let mut own = vec![false; self.spread.len()];
-        columns.iter().for_each(|&c| own[c] = true);
         let mut noise = self.noise.clone();
         let mut solved = self.solve(columns)?;
         for _ in 0..NOISE_STEPS {
             let next = self.left_by(&solved);
             let change = next.iter().zip(&noise).map(|(a, b)| (a / b).ln().abs()).fold(0.0, f64::max);
             noise = next;
-            solved = self.at_some(noise.clone(), &|c| own[c]).solve(columns)?;
+            solved = self.at_some(noise.clone(), columns).solve(columns)?;
             if change < NOISE_SETTLED {
                 break;
             }
@@ -231,7 +234,7 @@ impl<'a> Score<'a> {
         loop {
             let a = self.precision(&free);
             let right = DVector::from_fn(free.len(), |i, _| {
-                self.moment[free[i]] - held.iter().map(|(c, x)| self.gram[(free[i], *c)] * x).sum::<f64>()
+                self.moment(free[i]) - held.iter().map(|(c, x)| self.gram(free[i], *c) * x).sum::<f64>()
             });
             let factor = Factor::new(&a)?;
             let theta = factor.solve(&right);
@@ -239,7 +242,7 @@ impl<'a> Score<'a> {
                 .filter_map(|i| {
                     let (low, high) = self.bounds[free[i]];
                     let over = (low - theta[i]).max(theta[i] - high);
-                    let size = (self.gram[(free[i], free[i])] + 1.0).sqrt();
+                    let size = (self.gram(free[i], free[i]) + 1.0).sqrt();
                     (over > 0.0).then(|| (over * size, i, if theta[i] < low { low } else { high }))
                 })
                 .max_by(|a, b| a.0.total_cmp(&b.0));
@@ -251,8 +254,8 @@ impl<'a> Score<'a> {
             let fixed: f64 = held
                 .iter()
                 .map(|(c, x)| {
-                    let with: f64 = held.iter().map(|(d, y)| self.gram[(*c, *d)] * y).sum();
-                    x * (with + x - 2.0 * self.moment[*c])
+                    let with: f64 = held.iter().map(|(d, y)| self.gram(*c, *d) * y).sum();
+                    x * (with + x - 2.0 * self.moment(*c))
                 })
                 .sum();
             let nats = self.level - 0.5 * (self.square + fixed - right.dot(&theta)) - 0.5 * log_det;
@@ -262,7 +265,7 @@ impl<'a> Score<'a> {
     }
 
     fn precision(&self, columns: &[usize]) -> DMatrix<f64> {
-        let mut a = DMatrix::from_fn(columns.len(), columns.len(), |i, j| self.gram[(columns[i], columns[j])]);
+        let mut a = DMatrix::from_fn(columns.len(), columns.len(), |i, j| self.gram(columns[i], columns[j]));
         for i in 0..columns.len() {
             a[(i, i)] = a[(i, i)] * (1.0 + ROUNDING) + 1.0;
         }
@@ -275,7 +278,7 @@ impl<'a> Score<'a> {
         let m = solved.free.len();
         let columns: Vec<usize> = groups.iter().cloned().flatten().collect();
         // One solution for the columns of all groups is several times faster than one for each.
-        let cross = DMatrix::from_fn(m, columns.len(), |i, j| self.gram[(solved.free[i], columns[j])]);
+        let cross = DMatrix::from_fn(m, columns.len(), |i, j| self.gram(solved.free[i], columns[j]));
         let solution = solved.factor.solve_all(&cross);
         let firsts = groups.iter().scan(0, |next, own| Some(std::mem::replace(next, *next + own.len())));
         let groups: Vec<(usize, &Range<usize>)> = firsts.zip(groups).collect();
@@ -286,8 +289,8 @@ impl<'a> Score<'a> {
                 let cross = cross.columns(first, k);
                 let rest = DVector::from_fn(k, |j, _| {
                     let free: f64 = (0..m).map(|i| cross[(i, j)] * solved.theta[i]).sum();
-                    let held: f64 = solved.held.iter().map(|(c, x)| self.gram[(*c, own.start + j)] * x).sum();
-                    self.moment[own.start + j] - free - held
+                    let held: f64 = solved.held.iter().map(|(c, x)| self.gram(*c, own.start + j) * x).sum();
+                    self.moment(own.start + j) - free - held
                 });
                 let mut schur = self.precision(&own.clone().collect::<Vec<_>>());
                 schur -= cross.tr_mul(&solution.columns(first, k));

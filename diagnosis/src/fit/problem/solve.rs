@@ -217,8 +217,7 @@ impl Problem {
 
     /// Coefficients of all columns, deaf to what stands far out.
     pub fn robust(&self) -> Vec<f64> {
-        let all: Vec<usize> = (0..self.bounds.len()).collect();
-        self.solve_unbounded(&all, &self.total)
+        self.solve_unbounded(&self.all_columns(), &self.total)
     }
 }
 

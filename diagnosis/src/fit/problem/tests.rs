@@ -20,7 +20,7 @@ fn known_columns_are_those_of_a_problem_without_them() {
         let terms = terms.clone();
         let mut problem = Problem::new(&model, &signals, &band, &still, &moving, terms, known);
         problem.weigh(&band, &[]);
-        let all: Vec<usize> = (0..problem.bounds.len()).collect();
+        let all = problem.all_columns();
         problem.gram(&all, &all)
     };
     let (with, without) = (gram(&known), gram(&Known::default()));

@@ -111,6 +111,7 @@ impl Record<'_> {
                 learned.as_ref().and_then(|l| structure::noise(&self.sliding(j, &after.rows[j]), l.predicted[j]));
             *floor = floor.max(noise.unwrap_or(0.0));
         }
+        rows::floor_within(&mut floor, &after.rows);
         progress("intervals", 0.85);
         let everything = |_: usize| true;
         let squares = |rows: &Rows| rows::squares(&self.band, rows, everything);

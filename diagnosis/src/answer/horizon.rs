@@ -151,15 +151,16 @@ impl Errors {
         let plain: Vec<f64> = weights.iter().map(|w| if *w > 0.0 { 1.0 } else { 0.0 }).collect();
         let unknown = || Change { before: None, after: None, shrink: None, ci95: None };
         let paired = |before: &[Vec<f64>], after: &[Vec<f64>]| {
-            if before.is_empty() || after.is_empty() {
-                let known = |errors: &[Vec<f64>]| {
-                    (!errors.is_empty()).then(|| crate::record::rows::weighted_rms(&total(errors), &plain))
-                };
-                return Change { before: known(before), after: known(after), ..unknown() };
-            }
-            let counted = |b: &[f64]| b.last().is_some_and(|c| *c > 0.0);
+            let counted = |b: &Vec<f64>| b.last().is_some_and(|c| *c > 0.0);
+            let known = |errors: &[Vec<f64>]| {
+                errors.iter().any(counted).then(|| crate::record::rows::weighted_rms(&total(errors), &plain))
+            };
+            let unpaired = Change { before: known(before), after: known(after), ..unknown() };
             let (before, after): (Vec<_>, Vec<_>) =
                 before.iter().cloned().zip(after.iter().cloned()).filter(|(b, a)| counted(b) && counted(a)).unzip();
+            if before.is_empty() {
+                return unpaired;
+            }
             crate::answer::gap::change(&before, &after, &plain, 0.0)
         };
         let rollout = HORIZONS
@@ -169,5 +170,29 @@ impl Errors {
             .map(|(&horizon, (b, a))| HorizonChange { horizon, change: paired(b, a) })
             .collect();
         (paired(&self.velocity, &after.velocity), rollout)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where the model as described leaves for infinity its error is unknown: 0 to 0, "at the floor", it is not.
+    #[test]
+    fn a_horizon_that_one_model_never_reaches_has_no_figure_of_that_model() {
+        let reached = vec![vec![4.0, 1.0]];
+        let of = |last: Vec<Vec<f64>>| Errors {
+            position: reached.clone(),
+            velocity: reached.clone(),
+            rollout: [vec![reached.clone(); HORIZONS.len() - 1], vec![last]].concat(),
+        };
+        let (before, after) = (of(vec![vec![0.0, 0.0]]), of(reached.clone()));
+        let (one_step, rollout) = before.change(&after, &[1.0]);
+        assert_eq!((one_step.before, one_step.after), (Some(2.0), Some(2.0)));
+        let last = &rollout.last().unwrap().change;
+        assert_eq!((last.before, last.after, last.shrink), (None, Some(2.0), None));
+        assert_eq!(rollout.len(), HORIZONS.len());
+        let (_, none) = before.change(&before, &[1.0]);
+        assert_eq!(none.len(), HORIZONS.len() - 1, "a horizon that nothing reaches is left out");
     }
 }

@@ -55,9 +55,10 @@ pub fn evaluate(
         Some(c) => signals.iter().map(|s| c.residual(model, s)).collect::<Result<_, EffectError>>()?,
         None => nominal.clone(),
     };
-    let floor = noise_floor(&signals, &band, &after, n);
-    let floor_rms = rows::weighted_floor(&floor, &weights);
     let (before_rows, after_rows) = (rows::at_rows(&band, &nominal, n), rows::at_rows(&band, &after, n));
+    let mut floor = noise_floor(&signals, &band, &after, n);
+    rows::floor_within(&mut floor, &after_rows);
+    let floor_rms = rows::weighted_floor(&floor, &weights);
     let before_errors = horizon::errors_of(&signals, &band, model, |dt| Plant::nominal(model, dt));
     let change_where = |keep: &dyn Fn(usize) -> bool| {
         let squares = |rows: &Rows| rows::squares(&band, rows, keep);
@@ -125,8 +126,8 @@ pub fn torque_changes(
     let band = Band::whole(&signals);
     let nominal: Vec<Vec<Vec<f64>>> =
         signals.iter().map(|s| residual(&mut Plant::nominal(model, s.dt), model, s, &still, 0.0)).collect();
-    let squares = |residuals: &[Vec<Vec<f64>>]| rows::squares(&band, &rows::at_rows(&band, residuals, n), |_| true);
-    let before = squares(&nominal);
+    let squares = |rows: &Rows| rows::squares(&band, rows, |_| true);
+    let before = squares(&rows::at_rows(&band, &nominal, n));
     let mut floor = None;
     std::iter::once(&corrected.effects)
         .chain(instead)
@@ -134,9 +135,13 @@ pub fn torque_changes(
             let held = Corrected { effects: effects.clone(), ..corrected.clone() };
             let after: Vec<Vec<Vec<f64>>> =
                 signals.iter().map(|s| held.residual(model, s)).collect::<Result<_, EffectError>>()?;
-            let floor =
-                *floor.get_or_insert_with(|| rows::weighted_floor(&noise_floor(&signals, &band, &after, n), &weights));
-            Ok(gap::change(&before, &squares(&after), &weights, floor))
+            let after_rows = rows::at_rows(&band, &after, n);
+            let floor = *floor.get_or_insert_with(|| {
+                let mut floor = noise_floor(&signals, &band, &after, n);
+                rows::floor_within(&mut floor, &after_rows);
+                rows::weighted_floor(&floor, &weights)
+            });
+            Ok(gap::change(&before, &squares(&after_rows), &weights, floor))
         })
         .collect()
 }

@@ -98,7 +98,14 @@ pub fn of_joint(weights: &[f64], joint: usize) -> Vec<f64> {
     weights.iter().enumerate().map(|(j, w)| if j == joint { *w } else { 0.0 }).collect()
 }
 
-/// The same of noise floors, one a joint, N m or N.
+/// Noise floors, no higher than what a model leaves of held-out rows: that holds the noise, and its own errors beside it.
+pub fn floor_within(floor: &mut [f64], rows: &Rows) {
+    for (floor, joint) in floor.iter_mut().zip(rows).filter(|(_, joint)| !joint.is_empty()) {
+        *floor = floor.min((joint.iter().map(|x| x * x).sum::<f64>() / joint.len() as f64).sqrt());
+    }
+}
+
+/// sqrt(mean_j (w_j floor_j)²) over the joints with weight, from noise floors, one a joint, N m or N.
 pub fn weighted_floor(floor: &[f64], weights: &[f64]) -> f64 {
     let squares: Vec<f64> = floor.iter().map(|f| f * f).chain([1.0]).collect();
     weighted_rms(&squares, weights)
@@ -127,5 +134,13 @@ mod tests {
         assert!((left(&blocks(0)) - 1.0).abs() < 1e-12);
         assert!(left(&blocks(1)) > 50.0);
         assert_eq!(calm(&blocks(0), &[1.0; 2], &[false; 2]), [true; 5], "without play there are no jolts");
+    }
+
+    /// What is left of held-out rows holds the noise: 2 N m of noise and 1 N m left would contradict each other.
+    #[test]
+    fn a_noise_floor_is_no_more_than_what_is_left() {
+        let mut floor = [2.0, 0.5, 3.0];
+        floor_within(&mut floor, &vec![vec![1.0, -1.0], vec![1.0, -1.0], vec![]]);
+        assert_eq!(floor, [1.0, 0.5, 3.0], "and stays where nothing is left to look at");
     }
 }

@@ -5,6 +5,7 @@ use super::super::setting::Setting;
 use super::parts::*;
 use super::{Case, explained};
 use gapscope_diagnosis::Origin;
+use gapscope_diagnosis::schema::Combination;
 use glam::DVec3;
 
 const JOINTS: usize = 30;
@@ -32,10 +33,14 @@ pub fn large() -> (Case, Setting) {
     evidence.remaining = Some(gap(&names, &after, vec![]));
     diagnosis.effects.retain(|effect| effect.kind == "coulomb_friction");
     diagnosis.effects[0].joints = names.clone();
-    let coulomb = ("coulomb".to_owned(), each(&names, &rms, 0.04, "N m"));
-    diagnosis.effects[0].parameters = [coulomb].into();
+    // As wide as numbers get: those of a servo whose torque is known as a ratio.
+    let of = |parameter: &str| (parameter.to_owned(), each(&names, &rms, 0.04, "N m per N m/rad"));
+    diagnosis.effects[0].parameters = ["coulomb", "static_friction", "stribeck_velocity", "viscous"].map(of).into();
     diagnosis.unexplained.regimes = regimes(&names);
-    diagnosis.combinations.clear();
+    let combination = diagnosis.combinations[0].clone();
+    let of =
+        |name: &String| Combination { words: format!("mass of {name}_link and all it carries"), ..combination.clone() };
+    diagnosis.combinations = names.iter().map(of).collect();
     diagnosis.power.clear();
     evidence.torque = torque(&names, "N m", EPISODES * SAMPLES);
     for series in &mut evidence.torque {

@@ -49,9 +49,7 @@ pub fn render(diagnosis: &Diagnosis, corrected: &ServoModel) -> Option<Markup> {
     if actuators.is_empty() && mjcf.is_empty() {
         return None;
     }
-    let is_there = |kind: &str| CARRIED.contains(&kind) || (!actuators.is_empty() && DRIVEN.contains(&kind));
-    let lacking: Vec<String> =
-        diagnosis.effects.iter().map(|e| e.kind.clone()).filter(|kind| !is_there(kind)).collect();
+    let lacking = lacking(diagnosis.effects.iter().map(|e| e.kind.as_str()), !actuators.is_empty());
     let known = |joint: &&String| diagnosis.drive.get(*joint).is_some_and(has_torque);
     let open: Vec<String> = diagnosis.joints.iter().filter(|joint| !known(joint)).cloned().collect();
     let boxed = |id: &str, title: &str, lines: &[Line], text: &dyn Fn(&Line) -> String| {
@@ -72,6 +70,11 @@ pub fn render(diagnosis: &Diagnosis, corrected: &ServoModel) -> Option<Markup> {
             p.note { "Left out, as the logs tell ratios alone of its torques: " (words::joints(&open, &diagnosis.joints)) "." }
         }
     })
+}
+
+/// Kinds that no box has a number for, by whether there are actuators to write.
+fn lacking<'a>(kinds: impl Iterator<Item = &'a str>, driven: bool) -> Vec<String> {
+    kinds.filter(|kind| !CARRIED.contains(kind) && !(driven && DRIVEN.contains(kind))).map(str::to_owned).collect()
 }
 
 fn dynamics(line: &Line) -> String {
@@ -189,5 +192,13 @@ mod tests {
         );
         assert_eq!(of_joint(&mjcf("elbow", &model).unwrap()), r#"elbow:  frictionloss="0.2" armature="0.004""#);
         assert!(mjcf("wrist", &model).is_none());
+    }
+
+    /// A torque limit stands on the actuator: it is left out only where there is none.
+    #[test]
+    fn what_an_actuator_has_a_number_for_is_left_out_without_one_alone() {
+        let kinds = ["coulomb_friction", "torque_saturation", "servo_gain_error", "actuation_delay"];
+        assert_eq!(lacking(kinds.into_iter(), true), ["actuation_delay"]);
+        assert_eq!(lacking(kinds.into_iter(), false), ["torque_saturation", "servo_gain_error", "actuation_delay"]);
     }
 }

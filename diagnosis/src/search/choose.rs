@@ -9,7 +9,7 @@ impl Record<'_> {
     pub(crate) fn choose(&self, progress: Progress<'_>) -> Result<Chosen, EffectError> {
         let chosen = self.best_of(progress)?;
         let chosen = self.delay_or_lag(chosen)?;
-        let chosen = self.drive(chosen, progress)?;
+        let chosen = self.drive(chosen, None, progress)?;
         let chosen = self.likeliest(chosen, progress)?;
         let chosen = self.needed(self.shown(chosen, progress)?, progress)?;
         let chosen = self.held_back(chosen)?;

@@ -4,6 +4,7 @@ use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
 use crate::numbers::decide::{PRICE_OF_ODD, TWENTY_TO_ONE};
 use crate::record::data::Data;
+use crate::record::logs::Record;
 use crate::search::climb;
 use crate::search::climb::{Choice, Competition};
 use gapscope_effects::{Candidate, EffectError, Kind};
@@ -143,6 +144,17 @@ impl Data<'_> {
     ) -> Result<(Problem, Fit), EffectError> {
         let candidates = with_drive(all, set, turned);
         self.refine(&candidates, turned.and_then(|turned| turned.start(&candidates)))
+    }
+}
+
+impl Record<'_> {
+    /// An account with another set in the place of its own, at its exact law.
+    ///
+    /// # Errors
+    /// An effect that the robot cannot have.
+    pub(crate) fn instead(&self, of: &Chosen, set: Vec<usize>) -> Result<Chosen, EffectError> {
+        let (exact, fit) = self.data(&of.noise).exact(&of.all, &set, of.turned.as_ref())?;
+        Ok(of.with(Choice { set }, exact, fit))
     }
 }
 

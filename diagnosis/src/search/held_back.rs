@@ -5,7 +5,7 @@
 
 use crate::record::logs::Record;
 use crate::search::chosen::Chosen;
-use crate::search::climb::{self, Choice};
+use crate::search::climb;
 use gapscope_effects::EffectError;
 
 impl Record<'_> {
@@ -25,8 +25,7 @@ impl Record<'_> {
         }
         let mut set = [chosen.choice.set.as_slice(), &rotors].concat();
         set.sort_unstable();
-        let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
-        let with = chosen.with(Choice { set }, exact, fit);
+        let with = self.instead(&chosen, set)?;
         if with.odds_against(&chosen, self)? <= 0.0 {
             return Ok(chosen);
         }

@@ -12,7 +12,6 @@ use crate::record::logs::{PART_OF_NOISE, Record};
 use crate::record::rows::{Rows, at_rows};
 use crate::record::signals::Signals;
 use crate::search::chosen::Chosen;
-use crate::search::climb::Choice;
 use crate::search::noise::less;
 use gapscope_effects::{Candidate, EffectError, Late};
 
@@ -43,8 +42,7 @@ impl Record<'_> {
         let (lost, mut set) = (chosen.choice.set[at], chosen.choice.set.clone());
         set[at] = other;
         set.sort_unstable();
-        let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
-        let rival = chosen.with(Choice { set }, exact, fit);
+        let rival = self.instead(&chosen, set)?;
         // What they leave counts as a hint: noise is in it.
         let hint = rival.odds_against(&chosen, self)?.clamp(-told.hint, told.hint);
         let odds = self.odds_of_the_second([&chosen, &rival], &told)? + hint;
@@ -57,8 +55,7 @@ impl Record<'_> {
         // The instrument takes one of the two to be there. One that is not likelier than none of them is not.
         let mut set = likelier.choice.set.clone();
         set.retain(|&c| !likelier.all.entries[c].candidate.kind.card().is_late());
-        let (exact, fit) = self.data(&likelier.noise).exact(&likelier.all, &set, likelier.turned.as_ref())?;
-        let none = likelier.with(Choice { set }, exact, fit);
+        let none = self.instead(&likelier, set)?;
         if likelier.odds_against(&none, self)? <= 0.0 && second.odds_against(&none, self)? > 0.0 {
             (likelier, lost, doubt) = (second, first, 0.5);
         }

@@ -48,8 +48,7 @@ impl Record<'_> {
             if set.len() == chosen.choice.set.len() || clear {
                 continue;
             }
-            let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
-            let without = chosen.with(Choice { set: set.clone() }, exact, fit);
+            let without = self.instead(&chosen, set.clone())?;
             let mut odds = chosen.odds_against(&without, self)?;
             if odds <= 0.0 || !(kind.is_outside() || chosen.concerns_beside(&without)) {
                 chosen = without;
@@ -76,7 +75,7 @@ impl Record<'_> {
                 all.closed.extend(climb::told_together(kind));
                 let choice = rival.choice.clone();
                 let next = self.converge(all, choice, chosen.noise.clone(), chosen.turned.clone(), progress)?;
-                let next = if next.turned.is_none() { self.drive(next, progress)? } else { next };
+                let next = if next.turned.is_none() { self.drive(next, Some(&chosen), progress)? } else { next };
                 let over = chosen.odds_against(&next, self)?;
                 if over < 0.0 {
                     // What lost may still stand beside what won.
@@ -84,8 +83,7 @@ impl Record<'_> {
                     set.extend(&next.choice.set);
                     set.sort_unstable();
                     set.dedup();
-                    let (exact, fit) = self.data(&next.noise).exact(&next.all, &set, next.turned.as_ref())?;
-                    let both = next.with(Choice { set }, exact, fit);
+                    let both = self.instead(&next, set)?;
                     let beside = both.odds_against(&next, self)?;
                     let closed = std::mem::take(&mut chosen.all.closed);
                     let (tried, mut needed) = (std::mem::take(&mut chosen.tried), std::mem::take(&mut chosen.needed));
@@ -127,8 +125,7 @@ impl Record<'_> {
         let mut filled: Vec<usize> = (0..chosen.all.entries.len()).filter(described).chain(set).collect();
         filled.sort_unstable();
         filled.dedup();
-        let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &filled, chosen.turned.as_ref())?;
-        let filled = chosen.with(Choice { set: filled }, exact, fit);
+        let filled = self.instead(&chosen, filled)?;
         Ok(if filled.odds_against(&best, self)? > 0.0 { filled } else { best })
     }
 
@@ -153,8 +150,7 @@ impl Record<'_> {
             if set.len() != chosen.choice.set.len() {
                 continue;
             }
-            let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
-            let next = chosen.with(Choice { set }, exact, fit);
+            let next = self.instead(&chosen, set)?;
             if next.odds_against(chosen, self)? > 0.0 {
                 // The first look at all candidates is to be around this account.
                 let Chosen { all, choice, noise, turned, .. } = next;
@@ -192,8 +188,7 @@ impl Record<'_> {
                 let mut set = chosen.choice.set.clone();
                 let candidate = set.remove(gone);
                 if own.len() > 1 {
-                    let (exact, fit) = self.data(&chosen.noise).exact(&chosen.all, &set, chosen.turned.as_ref())?;
-                    let without = chosen.with(Choice { set }, exact, fit);
+                    let without = self.instead(&chosen, set)?;
                     // A rotor or a friction that links could stand for has a wide interval, though they hardly can be what they
                     // would have to be.
                     if kind.is_calibration() && chosen.odds_against(&without, self)? > 0.0 {

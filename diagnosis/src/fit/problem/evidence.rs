@@ -103,6 +103,11 @@ impl Problem {
     /// Sum over the joints of the mean logarithm of what a fit leaves of each block of time, each joint by its rows: a burst
     /// that no law of the catalogue hits counts as one block that is off.
     pub fn misfit(&self, fit: &Fit, band: &Band) -> f64 {
+        self.misfits(fit, band).iter().sum()
+    }
+
+    /// The misfit of each joint.
+    pub fn misfits(&self, fit: &Fit, band: &Band) -> Vec<f64> {
         let of = |(j, joint): (usize, &super::JointRows)| {
             let mut blocks = vec![(0.0, 0.0); band.blocks];
             for (row, rest) in joint.rows.iter().zip(joint.residual(&fit.columns, &fit.theta)) {
@@ -114,7 +119,7 @@ impl Problem {
                 blocks.iter().filter(|b| b.1 > 0.0).map(|b| (b.0 / b.1 + self.least_noise(j)).ln()).collect();
             joint.rows.len() as f64 * used.iter().sum::<f64>() / used.len().max(1) as f64
         };
-        self.joints.iter().enumerate().map(of).sum()
+        self.joints.iter().enumerate().map(of).collect()
     }
 
     /// What logs say for an account at its exact law, as good as the whole problem is linear about it (Laplace). What is left

@@ -28,10 +28,19 @@ type Tried = Vec<(Candidate, f64)>;
 impl Record<'_> {
     /// Puts a spring or play in the drive of one joint where the logs speak for it: beside all else that was found, beside the
     /// same without laws of the joint that may stand in for its drive, and, where noise may have drowned what a
-    /// spring does, through a filter.
-    pub(crate) fn drive(&self, rigid: Chosen, progress: Progress<'_>) -> Result<Chosen, EffectError> {
-        let joints = self.restless(&rigid)?;
-        let without = self.without_laws_of_joints(&rigid)?;
+    /// spring does, through a filter. Where it is held `against` another account, drives alone that could bring it there.
+    pub(crate) fn drive(
+        &self,
+        rigid: Chosen,
+        against: Option<&Chosen>,
+        progress: Progress<'_>,
+    ) -> Result<Chosen, EffectError> {
+        let aim = against.unwrap_or(&rigid);
+        let joints = self.within_reach(&rigid, aim, self.restless(&rigid)?)?;
+        let mut without = self.without_laws_of_joints(&rigid)?;
+        if let Some((base, joints)) = &mut without {
+            *joints = self.within_reach(base, aim, std::mem::take(joints))?;
+        }
         let plain: Vec<(&Chosen, &[usize])> = [(&rigid, &joints[..])]
             .into_iter()
             .chain(without.iter().map(|(base, joints)| (base, &joints[..])))
@@ -181,18 +190,33 @@ impl Record<'_> {
         Ok(best)
     }
 
-    /// Joints of which a choice leaves more than noise, those with most of it first.
-    fn restless(&self, chosen: &Chosen) -> Result<Vec<usize>, EffectError> {
-        let (exact, fit) = (&chosen.exact, &chosen.fit);
+    /// Some joints without those whose drive cannot bring an account as far as another is: it changes what is left of its own
+    /// joint, at best down to the noise.
+    fn within_reach(&self, account: &Chosen, aim: &Chosen, mut joints: Vec<usize>) -> Result<Vec<usize>, EffectError> {
+        let misfits = |of: &Chosen| of.exact.misfits(&of.fit, &self.band);
+        let lacks: Vec<f64> = misfits(account).iter().zip(misfits(aim)).map(|(own, aim)| own - aim).collect();
+        let (all, levels) = (lacks.iter().sum::<f64>(), self.levels_above_noise(aim)?);
+        let to_noise = |j: usize| 2.0 * self.band.rows.len() as f64 * levels[j].ln();
+        joints.retain(|&j| all - lacks[j] <= to_noise(j).max(0.0));
+        Ok(joints)
+    }
+
+    /// What an account leaves of each joint, in parts of its noise. Play shows for moments alone: what it leaves then counts in
+    /// full.
+    fn levels_above_noise(&self, chosen: &Chosen) -> Result<Vec<f64>, EffectError> {
         let rest = self.rest(chosen)?;
         let floor = noise_floor(&self.signals, &self.band, &rest, self.model.dof());
-        // Play shows for moments alone: what it leaves then counts in full.
-        let left = exact.left(fit);
-        let calm = |j: usize| floor[j].min(exact.sigma[j]).max(f64::MIN_POSITIVE);
-        let level = |j: usize| left[j].sqrt() / calm(j);
+        let left = chosen.exact.left(&chosen.fit);
+        let calm = |j: usize| floor[j].min(chosen.exact.sigma[j]).max(f64::MIN_POSITIVE);
+        Ok((0..self.model.dof()).map(|j| left[j].sqrt() / calm(j)).collect())
+    }
+
+    /// Joints of which a choice leaves more than noise, those with most of it first.
+    fn restless(&self, chosen: &Chosen) -> Result<Vec<usize>, EffectError> {
+        let level = self.levels_above_noise(chosen)?;
         let mut joints: Vec<usize> =
-            (0..self.model.dof()).filter(|&j| self.moving[j] && level(j) > FLOOR_KNOWN_TO.get()).collect();
-        joints.sort_by(|&a, &b| level(b).total_cmp(&level(a)));
+            (0..self.model.dof()).filter(|&j| self.moving[j] && level[j] > FLOOR_KNOWN_TO.get()).collect();
+        joints.sort_by(|&a, &b| level[b].total_cmp(&level[a]));
         Ok(joints)
     }
 
@@ -208,5 +232,32 @@ impl Record<'_> {
         let mut all = self.data(&chosen.noise).problem(candidates.map(open).collect(), &weighing());
         all.closed.clone_from(&chosen.all.closed);
         (all, entries.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gapscope_datasets::{Recipe, generate};
+    use gapscope_dynamics::robots;
+    use gapscope_effects::{CoulombFriction, Effect, Kind};
+
+    /// What is missing in the second joint no spring in the first makes up for.
+    #[test]
+    fn a_drive_reaches_no_farther_than_its_own_joint() {
+        let model = robots::model("double_pendulum").unwrap().unwrap().model;
+        let rubs = CoulombFriction { coulomb: model.joints().iter().map(|j| (j.name.clone(), 0.5)).collect() };
+        let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };
+        let log = generate(&model, &[Effect::CoulombFriction(rubs)], 1, &recipe, "log").unwrap();
+        let record = Record::new(&model, &[log], &mut Vec::new());
+        let found = record.choose(&|_, _| {}).unwrap();
+        let candidate = |c: &usize| &found.all.entries[*c].candidate;
+        let second = |c: &usize| candidate(c).kind == Kind::CoulombFriction && candidate(c).joints == [1];
+        let set: Vec<usize> = found.choice.set.iter().copied().filter(|c| !second(c)).collect();
+        assert_eq!(set.len() + 1, found.choice.set.len());
+        let smooth = record.instead(&found, set).unwrap();
+        let reached = |account: &Chosen| record.within_reach(account, &found, vec![0, 1]).unwrap();
+        assert_eq!(reached(&smooth), [1]);
+        assert_eq!(reached(&found), [0, 1], "what lacks nothing may gain in any joint");
     }
 }

@@ -6,8 +6,12 @@ use crate::support::{chain, gapscope, pendulum, said, servo_arm};
 #[test]
 fn report_and_index_work_in_a_browser() {
     let dir = pendulum();
-    for out in ["runs/first", "runs/second"] {
-        let output = gapscope(dir.path(), ["diagnose", "robot.urdf", "log.csv", "--out", out]);
+    let robot = std::fs::read_to_string(dir.path().join("robot.urdf")).unwrap();
+    let (_, rest) = robot.split_once("<robot name=\"").and_then(|(_, rest)| rest.split_once('"')).unwrap();
+    let long = format!("<robot name=\"arm_on_a_rail_with_many_joints_and_long_names\"{rest}");
+    std::fs::write(dir.path().join("long.urdf"), long).unwrap();
+    for (robot, out) in [("robot.urdf", "runs/first"), ("long.urdf", "runs/second")] {
+        let output = gapscope(dir.path(), ["diagnose", robot, "log.csv", "--out", out]);
         assert!(output.status.success(), "{}", said(&output));
     }
     let output = gapscope(dir.path(), ["report", "runs"]);

@@ -190,14 +190,15 @@ impl Record<'_> {
         Ok(best)
     }
 
-    /// Some joints without those whose drive cannot bring an account as far as another is: it changes what is left of its own
-    /// joint, at best down to the noise.
+    /// Some joints without those whose drive can hardly bring an account as far as another is. What it moves in other joints, with
+    /// an encoder on the motor, is no more than all that the other leaves above the noise: what an account lacks there beyond
+    /// that, something else is missing for.
     fn within_reach(&self, account: &Chosen, aim: &Chosen, mut joints: Vec<usize>) -> Result<Vec<usize>, EffectError> {
         let misfits = |of: &Chosen| of.exact.misfits(&of.fit, &self.band);
         let lacks: Vec<f64> = misfits(account).iter().zip(misfits(aim)).map(|(own, aim)| own - aim).collect();
         let (all, levels) = (lacks.iter().sum::<f64>(), self.levels_above_noise(aim)?);
-        let to_noise = |j: usize| 2.0 * self.band.rows.len() as f64 * levels[j].ln();
-        joints.retain(|&j| all - lacks[j] <= to_noise(j).max(0.0));
+        let to_noise: f64 = levels.iter().map(|level| 2.0 * self.band.rows.len() as f64 * level.ln().max(0.0)).sum();
+        joints.retain(|&j| all - lacks[j] <= to_noise);
         Ok(joints)
     }
 
@@ -244,7 +245,7 @@ mod tests {
 
     /// What is missing in the second joint no spring in the first makes up for.
     #[test]
-    fn a_drive_reaches_no_farther_than_its_own_joint() {
+    fn a_drive_makes_up_for_nothing_that_another_joint_lacks() {
         let model = robots::model("double_pendulum").unwrap().unwrap().model;
         let rubs = CoulombFriction { coulomb: model.joints().iter().map(|j| (j.name.clone(), 0.5)).collect() };
         let recipe = Recipe { seconds: 12.0, rate: 250.0, ..Recipe::default() };

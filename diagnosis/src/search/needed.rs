@@ -125,7 +125,7 @@ impl Record<'_> {
         let mut filled: Vec<usize> = (0..chosen.all.entries.len()).filter(described).chain(set).collect();
         filled.sort_unstable();
         filled.dedup();
-        let filled = self.instead(&chosen, filled)?;
+        let filled = self.instead(chosen, filled)?;
         Ok(if filled.odds_against(&best, self)? > 0.0 { filled } else { best })
     }
 
@@ -150,7 +150,7 @@ impl Record<'_> {
             if set.len() != chosen.choice.set.len() {
                 continue;
             }
-            let next = self.instead(&chosen, set)?;
+            let next = self.instead(chosen, set)?;
             if next.odds_against(chosen, self)? > 0.0 {
                 // The first look at all candidates is to be around this account.
                 let Chosen { all, choice, noise, turned, .. } = next;

@@ -74,7 +74,8 @@ pub fn render(diagnosis: &Diagnosis, corrected: &ServoModel) -> Option<Markup> {
 
 /// Kinds that no box has a number for, by whether there are actuators to write.
 fn lacking<'a>(kinds: impl Iterator<Item = &'a str>, driven: bool) -> Vec<String> {
-    kinds.filter(|kind| !CARRIED.contains(kind) && !(driven && DRIVEN.contains(kind))).map(str::to_owned).collect()
+    let is_there = |kind: &&str| CARRIED.contains(kind) || (driven && DRIVEN.contains(kind));
+    kinds.filter(|kind| !is_there(kind)).map(str::to_owned).collect()
 }
 
 fn dynamics(line: &Line) -> String {

@@ -56,7 +56,7 @@ fn a_servo_arm_without_torque_has_the_same_page_of_position() {
 }
 
 #[test]
-#[ignore = "its diagnosis takes minutes: each trial of the climb fills a matrix of all candidates; the page is tested with a made-up one"]
+#[ignore = "its diagnosis takes a minute: cargo test -p gapscope -- --ignored thirty; the page is tested with a made-up one, too"]
 fn thirty_joints_with_long_names_have_a_page_that_works() {
     let dir = chain(30);
     let output = gapscope(dir.path(), ["diagnose", "robot.urdf", "log.csv", "--out", "chain"]);

@@ -37,9 +37,13 @@ pub fn large() -> (Case, Setting) {
     let of = |parameter: &str| (parameter.to_owned(), each(&names, &rms, 0.04, "N m per N m/rad"));
     diagnosis.effects[0].parameters = ["coulomb", "static_friction", "stribeck_velocity", "viscous"].map(of).into();
     diagnosis.unexplained.regimes = regimes(&names);
-    let combination = diagnosis.combinations[0].clone();
-    let of =
-        |name: &String| Combination { words: format!("mass of {name}_link and all it carries"), ..combination.clone() };
+    let of = |name: &String| Combination {
+        words: format!("first moment along x of {name}_link and all it carries (zero pose)"),
+        terms: [].into(),
+        value: -0.000873,
+        ci95: [-0.007304, 0.005558],
+        unit: "kg m".into(),
+    };
     diagnosis.combinations = names.iter().map(of).collect();
     diagnosis.power.clear();
     evidence.torque = torque(&names, "N m", EPISODES * SAMPLES);

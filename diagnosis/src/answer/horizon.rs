@@ -149,13 +149,12 @@ impl Errors {
     /// Plain root mean square over the joints that have weight.
     pub fn change(&self, after: &Errors, weights: &[f64]) -> (Change, Vec<HorizonChange>) {
         let plain: Vec<f64> = weights.iter().map(|w| if *w > 0.0 { 1.0 } else { 0.0 }).collect();
-        let unknown = || Change { before: None, after: None, shrink: None, ci95: None };
         let paired = |before: &[Vec<f64>], after: &[Vec<f64>]| {
             let counted = |b: &Vec<f64>| b.last().is_some_and(|c| *c > 0.0);
             let known = |errors: &[Vec<f64>]| {
                 errors.iter().any(counted).then(|| crate::record::rows::weighted_rms(&total(errors), &plain))
             };
-            let unpaired = Change { before: known(before), after: known(after), ..unknown() };
+            let unpaired = Change { before: known(before), after: known(after), shrink: None, ci95: None };
             let (before, after): (Vec<_>, Vec<_>) =
                 before.iter().cloned().zip(after.iter().cloned()).filter(|(b, a)| counted(b) && counted(a)).unzip();
             if before.is_empty() {

@@ -56,8 +56,7 @@ pub fn evaluate(
         None => nominal.clone(),
     };
     let (before_rows, after_rows) = (rows::at_rows(&band, &nominal, n), rows::at_rows(&band, &after, n));
-    let mut floor = noise_floor(&signals, &band, &after, n);
-    rows::floor_within(&mut floor, &after_rows);
+    let floor = floor(&signals, &band, &after, &after_rows);
     let floor_rms = rows::weighted_floor(&floor, &weights);
     let before_errors = horizon::errors_of(&signals, &band, model, |dt| Plant::nominal(model, dt));
     let change_where = |keep: &dyn Fn(usize) -> bool| {
@@ -128,7 +127,7 @@ pub fn torque_changes(
         signals.iter().map(|s| residual(&mut Plant::nominal(model, s.dt), model, s, &still, 0.0)).collect();
     let squares = |rows: &Rows| rows::squares(&band, rows, |_| true);
     let before = squares(&rows::at_rows(&band, &nominal, n));
-    let mut floor = None;
+    let mut held_against = None;
     std::iter::once(&corrected.effects)
         .chain(instead)
         .map(|effects| {
@@ -136,14 +135,18 @@ pub fn torque_changes(
             let after: Vec<Vec<Vec<f64>>> =
                 signals.iter().map(|s| held.residual(model, s)).collect::<Result<_, EffectError>>()?;
             let after_rows = rows::at_rows(&band, &after, n);
-            let floor = *floor.get_or_insert_with(|| {
-                let mut floor = noise_floor(&signals, &band, &after, n);
-                rows::floor_within(&mut floor, &after_rows);
-                rows::weighted_floor(&floor, &weights)
-            });
+            let floor = *held_against
+                .get_or_insert_with(|| rows::weighted_floor(&floor(&signals, &band, &after, &after_rows), &weights));
             Ok(gap::change(&before, &squares(&after_rows), &weights, floor))
         })
         .collect()
+}
+
+/// Noise floor of each joint beside what a model leaves: of every run, and of that at the rows of the band.
+fn floor(signals: &[Signals], band: &Band, left: &[Vec<Vec<f64>>], left_rows: &Rows) -> Vec<f64> {
+    let mut floor = noise_floor(signals, band, left, left_rows.len());
+    rows::floor_within(&mut floor, left_rows);
+    floor
 }
 
 fn predictions(s: &Signals, band: &Band, episode: usize, before: &Rows, after: &Rows) -> Predictions {

@@ -91,7 +91,7 @@ pub struct Shrink {
 /// A gap before and after.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Change {
-    /// Nominal model; `None` where it cannot be simulated (singular mass matrix).
+    /// Nominal model; `None` where it cannot be simulated (singular mass matrix) or every rollout leaves for infinity.
     pub before: Option<f64>,
     /// Corrected model; `None` where it cannot be simulated.
     pub after: Option<f64>,

@@ -70,8 +70,7 @@ pub fn effects(
     before: Option<f64>,
 ) -> Vec<FoundEffect> {
     let mut found = Vec::new();
-    // The rise of friction under load is told with that friction.
-    for kind in Kind::ALL.into_iter().filter(|kind| *kind != Kind::LoadRise) {
+    for kind in Kind::ALL.into_iter().filter(|kind| !kind.is_part_of_base()) {
         let mut at: Vec<(usize, f64)> = Vec::new();
         for (j, c) in chosen.iter().enumerate() {
             let Some(c) = c else { continue };
@@ -161,12 +160,13 @@ fn estimates(joint: &Joint, chosen: &Chosen, spread: &Spread, kind: Kind) -> Vec
     // The rotor that comes with a spring or with play is told as `armature`.
     let own = kind.parameters().iter().filter(|(param, _, _)| *param != Param::Armature || kind == Kind::Armature);
     let mut all: Vec<(String, Estimate)> = own.map(one).collect();
-    if kind == Kind::Load && chosen.kinds.iter().any(|(other, _)| *other == Kind::LoadRise) {
-        all.extend(Kind::LoadRise.parameters().iter().map(one));
-    }
     if kind == Kind::Stribeck {
         all.push(one(&(Param::Coulomb, "coulomb", "N m")));
     }
+    // Of friction that rises towards rest the parts of plain friction are told with it.
+    let told_as = |other: Kind| other.base() == Some(kind) || (kind == Kind::Stribeck && other.base() == kind.base());
+    let parts = chosen.kinds.iter().map(|own| own.0).filter(|other| other.is_part_of_base() && told_as(*other));
+    all.extend(parts.flat_map(|part| part.parameters().iter().map(one)));
     all
 }
 

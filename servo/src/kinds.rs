@@ -14,6 +14,8 @@ pub enum Kind {
     Load,
     /// Friction under load that rises towards rest; stands on [`Kind::Load`], and is told as a part of it.
     LoadRise,
+    /// Dry friction under which a joint creeps where it would stick; stands on [`Kind::Coulomb`], and is told as a part of it.
+    Creep,
     /// Viscous friction; told from the drive's damping only where that is given or the motor is off for a while.
     Viscous,
     /// Rotor inertia.
@@ -45,11 +47,12 @@ pub enum Kind {
 
 impl Kind {
     /// All, in the order in which they are tried.
-    pub const ALL: [Kind; 17] = [
+    pub const ALL: [Kind; 18] = [
         Kind::Coulomb,
         Kind::Load,
         Kind::Stribeck,
         Kind::LoadRise,
+        Kind::Creep,
         Kind::Viscous,
         Kind::Armature,
         Kind::Bias,
@@ -72,6 +75,7 @@ impl Kind {
             Kind::Stribeck => "stribeck_friction",
             Kind::Load => "load_dependent_friction",
             Kind::LoadRise => "load_dependent_friction_rise",
+            Kind::Creep => "coulomb_friction_creep",
             Kind::Viscous => "viscous_friction",
             Kind::Armature => "armature",
             Kind::Bias => "torque_bias",
@@ -99,6 +103,7 @@ impl Kind {
             Kind::LoadRise => {
                 &[(Param::LoadRise, "load_rise", "-"), (Param::StribeckVelocity, "stribeck_velocity", "rad/s")]
             }
+            Kind::Creep => &[(Param::Creep, "creep_velocity", "rad/s")],
             Kind::Viscous => &[(Param::Viscous, "viscous", "N m s/rad")],
             Kind::Armature => &[(Param::Armature, "armature", "kg m²")],
             Kind::Bias => &[(Param::Bias, "bias", "N m")],
@@ -132,7 +137,7 @@ impl Kind {
     /// Where a fit of it may begin, in units of each parameter's scale; the best of them is taken.
     pub fn starts(self) -> &'static [f64] {
         match self {
-            Kind::Coulomb | Kind::Stribeck | Kind::Load | Kind::LoadRise => &[0.3, 1.0],
+            Kind::Coulomb | Kind::Stribeck | Kind::Load | Kind::LoadRise | Kind::Creep => &[0.3, 1.0],
             Kind::Saturation | Kind::SpeedLimit => &[0.5, 1.0, 1.6],
             Kind::DeadBand => &[1.0, 3.0],
             Kind::Delay => &[0.5, 2.0],
@@ -180,7 +185,7 @@ impl Kind {
             Kind::Elasticity | Kind::Backlash => {
                 (law[Param::Spring], law[Param::Gap], law.link_side) = (f64::INFINITY, 0.0, false);
             }
-            Kind::Coulomb => law[Param::Rise] = 0.0,
+            Kind::Coulomb => (law[Param::Rise], law[Param::Creep]) = (0.0, 0.0),
             Kind::Load => law[Param::LoadRise] = 0.0,
             _ => {}
         }
@@ -189,10 +194,15 @@ impl Kind {
     /// The kind that it stands on, and goes with.
     pub fn base(self) -> Option<Kind> {
         match self {
-            Kind::Stribeck => Some(Kind::Coulomb),
+            Kind::Stribeck | Kind::Creep => Some(Kind::Coulomb),
             Kind::LoadRise => Some(Kind::Load),
             _ => None,
         }
+    }
+
+    /// Whether it is told as a part of the kind that it stands on, and is no claim of its own.
+    pub fn is_part_of_base(self) -> bool {
+        matches!(self, Kind::LoadRise | Kind::Creep)
     }
 
     /// Kinds that cannot stand beside it.

@@ -8,7 +8,8 @@
 //! where w of a set point u is its error with λ u̇ on top: a derivative gain on the error is β = λ.
 //!
 //! linear in all that a log may or may not determine: where gravity and the bodies' inertia do not show, σ goes to zero and the
-//! ratios stay. Friction is set-valued at rest, and its bound is φ + ρ e^{−(q̇/v)²} + (μ + μ_s e^{−(q̇/v)²}) abs(w).
+//! ratios stay. Friction is set-valued at rest, and its bound is φ + ρ e^{−(q̇/v)²} + (μ + μ_s e^{−(q̇/v)²}) abs(w). Where it
+//! creeps it is no longer set-valued: up to a speed it is that part of its bound which the speed is of that one.
 //! Source of the friction with load: Duclusaud, Passault, Padois, Ly, "Extended friction models for the physics simulation of
 //! servo actuators", ICRA 2025.
 
@@ -36,6 +37,8 @@ pub enum Param {
     Load,
     /// μ_s.
     LoadRise,
+    /// Speed up to which dry friction grows in proportion, rad/s: a joint under load creeps. At zero it sticks.
+    Creep,
     /// δ, unit of w.
     Bias,
     /// ζ, rad: measured less true position.
@@ -59,7 +62,7 @@ pub enum Param {
 }
 
 /// How many parameters a law has.
-pub const PARAMS: usize = 19;
+pub const PARAMS: usize = 20;
 
 impl Param {
     /// All, in the order of [`Law::values`].
@@ -73,6 +76,7 @@ impl Param {
         Param::StribeckVelocity,
         Param::Load,
         Param::LoadRise,
+        Param::Creep,
         Param::Bias,
         Param::Offset,
         Param::Latency,
@@ -170,6 +174,8 @@ pub struct Row {
     pub delivered: f64,
     /// By how much less is delivered in the middle of the step for each rad/s on its way.
     pub yields: f64,
+    /// Part of `push` and of `factor` that is the drive's: its stiffness and its damping.
+    pub drive: [f64; 2],
     /// Weight of the step's end.
     pub end: f64,
 }
@@ -219,8 +225,7 @@ impl Law {
     #[inline(always)]
     pub fn row(&self, h: f64, q: f64, v: f64, order: Order, inertia: f64) -> Row {
         let p = &self.values;
-        let damping =
-            p[Param::Viscous as usize] + if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] };
+        let damping = if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] };
         let gone = way(h) * v;
         let (mut stiffness, mut w) = match order {
             Order::Off => (0.0, 0.0),
@@ -237,14 +242,16 @@ impl Law {
         if middle.abs() > limit {
             (stiffness, w) = (0.0, limit.copysign(middle));
         }
-        let drag = stiffness * way(h) + damping;
+        let of_drive = stiffness * way(h) + damping;
+        let drag = of_drive + p[Param::Viscous as usize];
         let armature = p[Param::Armature as usize] / h;
         let end = end_weight(inertia + armature, drag);
         Row {
+            drive: [w - (1.0 - end) * of_drive * v, end * of_drive],
             factor: armature + end * drag,
             push: armature * v + w + p[Param::Bias as usize] - (1.0 - end) * drag * v,
             delivered: w,
-            yields: 0.5 * h * stiffness + if matches!(order, Order::Off) { 0.0 } else { p[Param::Damping as usize] },
+            yields: 0.5 * h * stiffness + damping,
             end,
         }
     }
@@ -275,28 +282,67 @@ impl Law {
     /// load is that of the middle of the step: where it begins, friction would lag by half a step.
     #[inline(always)]
     pub fn settle(&self, row: &Row, v: f64, factor: f64, push: f64) -> f64 {
-        let end = self.settle_at(factor, push, self.bound(row, v), row.delivered);
+        let end = self.settle_at(factor, push, self.bound(row, v), row.drive);
         if self.is_friction_plain() {
             return end;
         }
-        self.settle_at(factor, push, self.bound(row, 0.5 * (v + end)), row.delivered)
+        self.settle_at(factor, push, self.bound(row, 0.5 * (v + end)), row.drive)
     }
 
     /// Speed at the end of a step under a bound of friction.
     #[inline(always)]
-    fn settle_at(&self, factor: f64, push: f64, bound: f64, delivered: f64) -> f64 {
-        if push.abs() <= bound {
+    fn settle_at(&self, factor: f64, push: f64, bound: f64, [own_push, own_factor]: [f64; 2]) -> f64 {
+        let creep = self.values[Param::Creep as usize];
+        if creep > 0.0 {
+            let creeps = push / (factor + bound / creep);
+            if creeps.abs() <= creep {
+                return creeps;
+            }
+        } else if push.abs() <= bound {
             return 0.0;
         }
         let end = (push - bound.copysign(push)) / factor;
-        let without = || (push - delivered - bound.copysign(push)) / factor;
-        SpeedLimit::speed(end, delivered, self.values[Param::Speed as usize], without)
+        let coasting = || (push - own_push - bound.copysign(push)) / (factor - own_factor).max(1e-300);
+        SpeedLimit::speed(end, self.values[Param::Speed as usize], coasting)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_joint_under_load_sticks_or_creeps() {
+        let mut law = Law::default();
+        law[Param::Scale] = 1.0;
+        law[Param::Coulomb] = 0.2;
+        let h = 1e-3;
+        let row = law.row(h, 0.0, 0.0, Order::Deliver(0.1), 1.0 / h);
+        // No inertia to speak of: what the drive delivers is what friction holds.
+        let speed = |law: &Law, push: f64| law.settle(&row, 0.0, 1e-9, push);
+        assert_eq!(speed(&law, 0.1), 0.0);
+        law[Param::Creep] = 0.05;
+        assert!((speed(&law, 0.1) - 0.025).abs() < 1e-6);
+        assert!((speed(&law, -0.2) + 0.05).abs() < 1e-6);
+        // Beyond its bound it slides, and friction is the same.
+        assert!((law.settle(&row, 0.0, 2.0, 0.6) - 0.2).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_drive_at_its_speed_neither_drives_nor_holds_a_load() {
+        let mut law = Law::default();
+        (law[Param::Scale], law[Param::Damping], law[Param::Speed]) = (1.0, 0.3, 2.0);
+        let (h, inertia) = (1e-3, 0.01);
+        let end = |push: f64, load: f64| {
+            let row = law.row(h, 0.0, 2.5, Order::Deliver(push), inertia / h);
+            law.settle(&row, 2.5, row.factor + inertia / h, row.push + inertia / h * 2.5 + load)
+        };
+        // Without its drive a load of 1 N m is faster by h/inertia of it, and none goes on as it went.
+        assert!((end(5.0, 1.0) - 2.6).abs() < 1e-9);
+        assert!((end(5.0, 0.0) - 2.5).abs() < 1e-9);
+        // What it asks for less than its own damping brakes.
+        assert!(end(0.1, 0.0) < 2.5 && end(-5.0, 0.0) < 2.1);
+    }
 
     #[test]
     fn a_servo_acts_for_the_part_of_a_step_that_lies_outside_its_dead_band() {

@@ -44,6 +44,9 @@ pub struct DriveModel {
     /// Friction under load that rises towards rest, beside `load_dependent_friction`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load_rise: Option<LoadRise>,
+    /// Speed up to which dry friction grows in proportion to it, rad/s: a joint under load creeps. At zero it sticks.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub creep_velocity: f64,
     /// Whether the encoder is on the link's side of a spring or of play; else it is on the motor's.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub link_side: bool,
@@ -184,6 +187,7 @@ impl ServoModel {
                 dead_band: law[Param::DeadBand],
                 load_rise: (law[Param::LoadRise] > 0.0)
                     .then(|| LoadRise { rise: law[Param::LoadRise], stribeck_velocity: law[Param::StribeckVelocity] }),
+                creep_velocity: law[Param::Creep],
                 link_side: law.link_side,
             };
             (joint.name.clone(), drive)
@@ -223,7 +227,7 @@ impl ServoModel {
             let limits = [drive.limit, drive.speed_limit, drive.gain];
             let sound = above(drive.torque_per_unit)
                 && above(drive.feedback)
-                && [drive.damping, drive.feedforward, drive.dead_band].into_iter().all(least)
+                && [drive.damping, drive.feedforward, drive.dead_band, drive.creep_velocity].into_iter().all(least)
                 && drive.latency.is_finite()
                 && limits.into_iter().flatten().all(above);
             if !sound {
@@ -282,6 +286,7 @@ impl ServoModel {
         law[Param::Limit] = drive.limit.unwrap_or(f64::INFINITY);
         law[Param::Speed] = drive.speed_limit.unwrap_or(f64::INFINITY);
         law[Param::DeadBand] = drive.dead_band;
+        law[Param::Creep] = drive.creep_velocity;
         if let Some(under_load) = drive.load_rise {
             law[Param::LoadRise] = under_load.rise.max(0.0);
             law[Param::StribeckVelocity] = under_load.stribeck_velocity.max(1e-6);

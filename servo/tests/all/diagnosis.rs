@@ -110,6 +110,32 @@ fn dry_friction_and_a_rotor_are_found_with_their_sizes() {
     assert_eq!(ServoModel::from_json(&text, &model).unwrap(), outcome.corrected);
 }
 
+#[test]
+fn friction_under_which_a_joint_creeps_is_told_with_the_speed_of_it() {
+    let model = model();
+    let (kinds, outcome) = kinds(
+        &model,
+        &logs(&model, [6.0, 3.0], |law| {
+            law[Param::Coulomb] = 0.03;
+            law[Param::Creep] = 0.05;
+        }),
+    );
+    assert_eq!(kinds, ["coulomb_friction"]);
+    assert_eq!(outcome.diagnosis.verdict, "explained");
+    for (joint, stiffness) in [("a", 6.0), ("b", 3.0)] {
+        let coulomb = of(&outcome.diagnosis, "coulomb_friction", "coulomb", joint);
+        assert!((coulomb / (0.03 * stiffness) - 1.0).abs() < 0.1, "{joint}: {coulomb}");
+        let creep = of(&outcome.diagnosis, "coulomb_friction", "creep_velocity", joint);
+        assert!((creep / 0.05 - 1.0).abs() < 0.2, "{joint}: {creep}");
+    }
+    let text = serde_json::to_string(&outcome.corrected).unwrap();
+    let read = ServoModel::from_json(&text, &model).unwrap();
+    assert_eq!(read, outcome.corrected);
+    // The law of the corrected arm creeps as well.
+    let mut all = joints(&model, &logs(&model, [6.0, 3.0], |_| {}), &Given::default());
+    assert!(read.laws(&mut all).unwrap().iter().all(|law| (law[Param::Creep] / 0.05 - 1.0).abs() < 0.2));
+}
+
 /// A turntable that carries nothing, its derivative gain on the error: in a law that brakes by its own speed alone, this friction
 /// was taken for friction under load.
 #[test]

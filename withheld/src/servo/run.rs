@@ -99,16 +99,16 @@ fn follow(plant: &mut impl Robot, drives: &[Drive], told: &Told, clock: &Clock, 
         plant.step(&mut x, &tau);
         for j in 0..n {
             let (limit, reached) = (drives[j].speed_limit, x[n + j]);
-            if reached.abs() <= limit || pushes[j] * reached <= 0.0 {
+            if reached.abs() <= limit {
                 continue;
             }
             // A drive at its speed pushes only as hard as that asks for: speed is linear in torque within a step.
-            tau[j] -= pushes[j];
+            let asked = std::mem::take(&mut tau[j]);
             free.copy_from_slice(&before);
             plant.step(&mut free, &tau);
-            let wanted = SpeedLimit::speed(reached, pushes[j], limit, || free[n + j]);
+            let wanted = SpeedLimit::speed(reached, limit, || free[n + j]);
             let part = (wanted - free[n + j]) / (reached - free[n + j]);
-            tau[j] += pushes[j] * if part.is_finite() { part.clamp(0.0, 1.0) } else { 0.0 };
+            tau[j] = asked * if part.is_finite() { part.clamp(0.0, 1.0) } else { 0.0 };
             x.copy_from_slice(&before);
             plant.step(&mut x, &tau);
         }

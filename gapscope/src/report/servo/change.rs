@@ -169,6 +169,7 @@ mod tests {
             speed_limit: None,
             dead_band: 0.0,
             load_rise: None,
+            creep_velocity: 0.0,
             link_side: false,
         };
         let of_actuator = |drive: &DriveModel| actuator("elbow", drive).map(|line| position(&line));

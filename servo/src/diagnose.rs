@@ -3,6 +3,7 @@
 
 use crate::arm::{simulate_arm, trace_arm};
 use crate::around::{Motion, motion};
+use crate::choice::FULL;
 use crate::choose::{Chosen, From, choose};
 use crate::claims::{confidence, drive, effects, reasons, whole_effect};
 use crate::clock::nominal_rate;
@@ -83,18 +84,18 @@ pub fn diagnose(
     for pass in 0..PASSES {
         // What jolts between samples did is no spring: the free run of the arm, which has those jolts, says so first. Of a link that
         // turns apart from its motor the encoder shows one side, and what the log corrects of it is not told from what its motor
-        // does: it is looked at anew from its account without a spring, and joints that then have one stay as they are.
+        // does: it is looked at anew from its account without a spring, once. A spring that is found again stays, and the other
+        // joints are looked at beside the motion of the link behind it.
         let rigid: Vec<From> = chosen.iter().map(|own| own.as_ref().map_or(From::Nothing, Chosen::rigid)).collect();
         drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
-        let apart = laws_of(&chosen).iter().flatten().any(Law::winds_up);
         // One joint alone has no others whose motion it feels.
-        if all.len() == 1 || (apart && pass > 0) {
+        if all.len() == 1 {
             break;
         }
         // Once more, in surroundings by what was found of the others.
         progress("each joint beside what was found of the others", 0.7 + 0.05 * pass as f64);
         let begin = |(own, rigid): (&Option<Chosen>, &From)| match own {
-            Some(own) if own.fit.law.winds_up() => rigid.clone(),
+            Some(own) if own.fit.law.winds_up() && pass == 0 => rigid.clone(),
             Some(own) => own.account(),
             None => From::Nothing,
         };
@@ -104,7 +105,9 @@ pub fn diagnose(
         // What joints have beside an effect of the whole arm was found beside its first numbers.
         let accounts: Vec<From> =
             chosen.iter().zip(&rigid).map(|own| if had { From::Nothing } else { begin(own) }).collect();
-        chosen = choose_all(&mut all, &accounts);
+        let stay: Vec<bool> =
+            chosen.iter().map(|own| pass > 0 && own.as_ref().is_some_and(|own| own.fit.law.winds_up())).collect();
+        choose_anew(&mut all, &accounts, &stay, &mut chosen);
     }
     drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
     progress("the numbers of the arm and its joints, by finer steps", 0.85);
@@ -219,6 +222,15 @@ const CONSTANT: [Kind; 2] = [Kind::Bias, Kind::Offset];
 
 fn choose_all(joints: &mut [Joint], from: &[From]) -> Vec<Option<Chosen>> {
     joints.par_iter_mut().zip(from).map(|(joint, from)| joint.moved.then(|| choose(joint, from))).collect()
+}
+
+/// Chooses joints anew; those that stay keep their account, and get its numbers in their surroundings.
+fn choose_anew(joints: &mut [Joint], from: &[From], stay: &[bool], chosen: &mut [Option<Chosen>]) {
+    let each = joints.par_iter_mut().zip(chosen).zip(from.par_iter().zip(stay));
+    each.filter(|((joint, _), _)| joint.moved).for_each(|((joint, own), (from, stay))| match own {
+        Some(own) if *stay => own.fit = fit(&own.fit.law, &own.fit.free, &joint.runs, &joint.ranges, FULL),
+        _ => *own = Some(choose(joint, from)),
+    });
 }
 
 /// Numbers of what was chosen, by finer steps of the integrator than a search can afford.

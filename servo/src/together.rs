@@ -14,7 +14,13 @@ use rayon::prelude::*;
 
 /// Takes springs and play out of the accounts of joints where the free run of the whole arm does not miss them.
 pub fn drop_what_the_arm_does_not_miss(model: &Model, joints: &[Joint], chosen: &mut [Option<Chosen>]) {
-    for j in 0..joints.len() {
+    // The weakest first: what a spring elsewhere does to a joint looks like a smaller one of its own.
+    let worth = |own: &Option<Chosen>| {
+        own.iter().flat_map(|own| &own.kinds).filter(|own| own.0.turns_apart()).map(|own| own.1).sum::<f64>()
+    };
+    let mut order: Vec<usize> = (0..joints.len()).collect();
+    order.sort_by(|&a, &b| worth(&chosen[a]).total_cmp(&worth(&chosen[b])));
+    for j in order {
         let Some(poorer) = chosen[j].as_mut().and_then(|own| own.poorer.take()) else { continue };
         let mut laws = laws(joints, chosen.iter().map(|c| c.as_ref().map(|c| c.fit.law)));
         let rich = squares(model, &laws, joints)[j];

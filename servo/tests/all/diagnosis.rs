@@ -247,6 +247,22 @@ fn a_spring_behind_a_motor_is_found_with_its_stiffness() {
     assert!((found / (inertia * 25.0 * 25.0) - 1.0).abs() < 0.2, "{found} {:?}", diagnosis.effects);
 }
 
+/// What a spring does to its neighbour looks like a spring of that one.
+#[test]
+fn a_spring_is_told_of_its_own_joint_alone() {
+    let model = model();
+    let logs = of_each(&model, &[6.0, 3.0], |j, law| {
+        if j == 0 {
+            law[Param::Spring] = 22.0;
+            law[Param::Armature] = 0.002;
+        }
+    });
+    let diagnosis = diagnose(&model, &logs, &Given::default(), Vec::new(), &|_, _| {}).unwrap().diagnosis;
+    let [effect] = diagnosis.effects.as_slice() else { panic!("{:?}", diagnosis.effects) };
+    assert_eq!((effect.kind.as_str(), effect.joints.as_slice()), ("joint_elasticity", &["a".to_owned()][..]));
+    assert!(diagnosis.shrink.position.after.unwrap() < 1.5 * TICK / 12f64.sqrt(), "{:?}", diagnosis.shrink);
+}
+
 #[test]
 fn a_body_at_the_flange_is_found_against_a_given_servo() {
     let model = model();

@@ -1,5 +1,6 @@
 //! What the rest of the arm does to each joint along a log.
 
+use crate::clock::bridge;
 use crate::run::{Around, Surroundings};
 use gapscope_datasets::Episode;
 use gapscope_dynamics::{Data, JointKind, Model};
@@ -96,9 +97,7 @@ pub fn motion(episode: &Episode, stale: &[bool], traces: &[Option<Trace>]) -> Mo
     let state = episode.position.iter().zip(traces).map(|(measured, trace)| {
         let shown = |k: usize| trace.as_ref().map_or(0.0, |trace| trace.shown[k]);
         let mut rest: Vec<f64> = measured.iter().enumerate().map(|(k, q)| q - shown(k)).collect();
-        for k in (1..rest.len().saturating_sub(1)).filter(|&k| stale[k]) {
-            rest[k] = 0.5 * (rest[k - 1] + rest[k + 1]);
-        }
+        bridge(time, stale, &mut rest);
         let slow: Vec<[f64; 3]> = (0..time.len()).map(|k| parabola(time, &rest, k)).collect();
         let rows = (time.len() - 1) * per + 1;
         let mut state = [vec![0.0; rows], vec![0.0; rows], vec![0.0; rows]];

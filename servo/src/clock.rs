@@ -7,7 +7,7 @@ use gapscope_datasets::Episode;
 const EVEN: f64 = 0.016;
 
 /// Whether the stamps of a log lie on an even raster.
-fn is_even(time: &[f64]) -> bool {
+pub fn is_even(time: &[f64]) -> bool {
     if time.len() < 3 {
         return false;
     }
@@ -33,8 +33,10 @@ pub fn nominal_rate(episodes: &[Episode]) -> Option<String> {
     ))
 }
 
-/// Steps of an encoder that a joint goes on by, from before a repeated sample to after it, where it does not rest.
+/// Steps of an encoder that a joint goes on by, from before repeated samples to after them, where it does not rest; and how many
+/// of them follow each other at most: an arm that starts has rested for longer.
 const GOES_ON: f64 = 4.0;
+const IN_A_ROW: usize = 3;
 
 /// Which samples repeat the one before in all joints while some joint goes on: readings that the recorder did not get.
 pub fn repeats(episode: &Episode) -> Vec<bool> {
@@ -43,11 +45,30 @@ pub fn repeats(episode: &Episode) -> Vec<bool> {
         changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min)
     };
     let rows: Vec<(&Vec<f64>, f64)> = episode.position.iter().map(|row| (row, step(row))).collect();
-    let is_one = |k: usize| {
-        let goes_on = |(row, step): &(&Vec<f64>, f64)| (row[k + 1] - row[k - 1]).abs() >= GOES_ON * step;
-        rows.iter().all(|(row, _)| row[k] == row[k - 1]) && rows.iter().any(goes_on)
-    };
-    (0..episode.len()).map(|k| k > 0 && k + 1 < episode.len() && is_one(k)).collect()
+    let repeats = |k: usize| rows.iter().all(|(row, _)| row[k] == row[k - 1]);
+    let mut lost = vec![false; episode.len()];
+    let mut from = 1;
+    while from < episode.len() {
+        let next = (from..episode.len()).find(|&k| !repeats(k)).unwrap_or(episode.len());
+        let goes_on = |(row, step): &(&Vec<f64>, f64)| (row[next] - row[from - 1]).abs() >= GOES_ON * step;
+        if (1..=IN_A_ROW).contains(&(next - from)) && next < episode.len() && rows.iter().any(goes_on) {
+            lost[from..next].fill(true);
+        }
+        from = next + 1;
+    }
+    lost
+}
+
+/// Puts the line between the samples around them in the place of samples that were lost.
+pub fn bridge(time: &[f64], lost: &[bool], samples: &mut [f64]) {
+    let mut last = 0;
+    for k in (0..samples.len()).filter(|&k| !lost[k]) {
+        for i in last + 1..k {
+            let part = (time[i] - time[last]) / (time[k] - time[last]);
+            samples[i] = samples[last] + part * (samples[k] - samples[last]);
+        }
+        last = k;
+    }
 }
 
 #[cfg(test)]
@@ -71,6 +92,14 @@ mod tests {
     }
 
     #[test]
+    fn lost_samples_lie_on_the_line_between_their_neighbours() {
+        let time = [0.0, 0.1, 0.2, 0.4, 0.5];
+        let mut samples = [1.0, 3.0, 3.0, 3.0, 11.0];
+        bridge(&time, &[false, false, true, true, false], &mut samples);
+        assert!(samples.iter().zip([1.0, 3.0, 5.0, 9.0, 11.0]).all(|(a, b): (&f64, f64)| (a - b).abs() < 1e-12));
+    }
+
+    #[test]
     fn a_lost_reading_is_told_from_a_joint_that_rests() {
         let tick = 1.5e-3;
         let moves: Vec<f64> = (0..50).map(|k: i32| tick * f64::from(k + 4 * (k - 10).max(0))).collect();
@@ -88,6 +117,12 @@ mod tests {
         let at =
             |log: &Episode| repeats(log).iter().enumerate().filter(|(_, is)| **is).map(|(k, _)| k).collect::<Vec<_>>();
         assert_eq!(at(&log([&lost(&moves), &lost(&creeps)])), [20]);
+        // Two readings in a row may be lost; an arm that starts has rested for longer.
+        let mut two = lost(&moves);
+        two[21] = two[19];
+        assert_eq!(at(&log([&two, &two])), [20, 21]);
+        let starts: Vec<f64> = (0..50).map(|k: i32| tick * f64::from(9 * (k - 25).max(0))).collect();
+        assert_eq!(at(&log([&starts, &starts])), [0; 0]);
         // One joint alone that repeats may rest; all that creep rest between the steps of their encoders.
         assert_eq!(at(&log([&lost(&moves), &moves])), [0; 0]);
         assert_eq!(at(&log([&creeps, &creeps])), [0; 0]);

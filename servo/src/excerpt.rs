@@ -100,6 +100,8 @@ mod tests {
             mass: 0.01,
             weight: vec![1.0; count],
             stale: vec![false; count],
+            is_counted: false,
+            strays: 0.0,
             time: time.clone(),
             step: 5e-3,
             steps: Steps::default(),

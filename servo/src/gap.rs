@@ -1,6 +1,7 @@
 //! How far a model's free run is from the logs: where, and by how much less after the corrections.
 
 use crate::around::derivatives;
+use crate::clock::bridge;
 use crate::prepare::Joint;
 use crate::schema::{Bounds, Change, PerJoint, Regime};
 
@@ -14,11 +15,16 @@ const REVERSAL: f64 = 0.15;
 /// Errors of a model, `[log][joint][sample]`, rad.
 pub type Errors = Vec<Vec<Vec<f64>>>;
 
-/// Errors of simulated paths, `[log][joint][sample]`.
+/// Errors of simulated paths, `[log][joint][sample]`; at readings that were lost they go on as around them.
 pub fn errors(paths: &[Vec<Vec<f64>>], joints: &[Joint]) -> Errors {
     let of = |(log, paths): (usize, &Vec<Vec<f64>>)| {
-        let rows = paths.iter().zip(joints);
-        rows.map(|(path, joint)| path.iter().zip(&joint.runs[log].position).map(|(a, b)| a - b).collect()).collect()
+        let one = |(path, joint): (&Vec<f64>, &Joint)| {
+            let run = &joint.runs[log];
+            let mut row: Vec<f64> = path.iter().zip(&run.position).map(|(a, b)| a - b).collect();
+            bridge(&run.time, &run.stale, &mut row);
+            row
+        };
+        paths.iter().zip(joints).map(one).collect()
     };
     paths.iter().enumerate().map(of).collect()
 }

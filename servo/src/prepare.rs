@@ -1,7 +1,7 @@
 //! Runs of each joint out of logs, and what their parameters may be.
 
 use crate::around::{derivatives, motion, surroundings};
-use crate::clock::repeats;
+use crate::clock::{bridge, is_even, repeats};
 use crate::fit::Ranges;
 use crate::given::Given;
 use crate::law::{Law, PARAMS, Param};
@@ -171,12 +171,14 @@ fn joint(
         moved |= spread(&episode.position[j]) > 0.01 || target.is_some_and(|u| spread(u) > 0.01);
         let start = episode.time[0];
         let time: Vec<f64> = episode.time.iter().map(|t| t - start).collect();
+        let mut position = episode.position[j].clone();
+        bridge(&time, &stale[log], &mut position);
         runs.push(Run {
             target_rate: target.map(|u| Held::new(&time, u).rate()),
             target: target.map(|u| Held::new(&time, u)),
             delivered: w.filter(|_| target.is_none()).map(|w| Held::new(&time, w)),
             restarts: restarts(&on, target.is_some(), episode.dt()),
-            position: episode.position[j].clone(),
+            position,
             on,
             gain: gain / reference,
             own_gain,
@@ -185,6 +187,8 @@ fn joint(
             mass: 0.0,
             weight: stale[log].iter().map(|stale| f64::from(u8::from(!stale))).collect(),
             stale: stale[log].clone(),
+            is_counted: is_even(&episode.time),
+            strays: 0.0,
             time,
             step: 5e-3,
             steps: Steps::default(),

@@ -3,27 +3,34 @@
 use crate::law::Law;
 use crate::prepare::Joint;
 use crate::simulate::simulate;
+use crate::weigh::{speeds, tracking};
 
 /// Time over which errors are averaged before they are held against noise, s: noise forgets within a sample or two, what an
 /// effect leaves lasts as long as a motion does.
 const SPAN: f64 = 0.15;
 /// Means of errors up to this many standard deviations of one sample's rounding are noise: no integrator is another's to better.
 const ROUNDING: f64 = 1.5;
+/// Means of errors up to this part of perfect tracking's are noise: simulators differ by as much in how friction sticks, loops
+/// answer and limits hold.
+const MODELLED: f64 = 0.015;
 /// Means of errors up to this many times what errors that forget from sample to sample leave of them are noise: clocks jitter,
 /// and samples repeat.
 const WHITE: f64 = 2.5;
 
 /// What is left of a joint against what noise would leave: up to one it is noise. Root mean squares of means over [`SPAN`]; the
-/// noise of a sample is told by the change of the error from one to the next.
+/// noise of a sample is told by the change of the error from one to the next. A clock that strays moves a whole answer to a step of
+/// the set point: up to that, too, it is noise.
 pub fn structure(joint: &Joint, law: &Law) -> f64 {
     let rounding = joint.encoder_step() / 12f64.sqrt();
     let count = ((SPAN / joint.dt.max(1e-4)).round() as usize).max(2);
     let mut path = Vec::new();
+    let mut strays = Vec::new();
     let errors: Vec<Vec<f64>> = joint
         .runs
         .iter()
         .map(|run| {
             simulate(law, run, &mut path);
+            strays.extend(speeds(&run.time, &path).iter().map(|speed| run.strays * speed));
             let rows = path.iter().zip(&run.position).zip(&run.stale);
             rows.map(|((a, b), stale)| if *stale { 0.0 } else { a - b }).collect()
         })
@@ -32,7 +39,11 @@ pub fn structure(joint: &Joint, law: &Law) -> f64 {
     let means = rms(errors.iter().flat_map(|run| run.chunks_exact(count)).map(mean));
     // Of white noise, half of the mean square of changes is its variance.
     let white = rms(errors.iter().flat_map(|run| run.windows(2)).map(|pair| pair[1] - pair[0])) / 2f64.sqrt();
-    let left = means / (ROUNDING * rounding).max(WHITE * white / (count as f64).sqrt());
+    let compared: f64 = joint.runs.iter().flat_map(|run| &run.weight).map(|weight| weight * weight).sum();
+    let perfect = (tracking(joint) / compared.max(1e-300)).sqrt();
+    let noise =
+        [ROUNDING * rounding, WHITE * white / (count as f64).sqrt(), MODELLED * perfect, rms(strays.into_iter())];
+    let left = means / noise.into_iter().fold(0.0, f64::max);
     if left.is_nan() { f64::INFINITY } else { left }
 }
 
@@ -66,6 +77,8 @@ mod tests {
             mass: 0.01,
             weight: vec![1.0; count],
             stale: vec![false; count],
+            is_counted: false,
+            strays: 0.0,
             time,
             step: 5e-3,
             steps: Steps::default(),
@@ -89,5 +102,33 @@ mod tests {
         let slow: Vec<f64> = (0..2000).map(|k| ((0.01 * k as f64).sin() * 3.0).round() * tick).collect();
         assert!(structure(&joint(white), &law()) <= 1.0);
         assert!(structure(&joint(slow), &law()) > 2.0);
+    }
+
+    /// A joint that follows a swing of its set point by its law, but for an error that swings with this amplitude, rad.
+    fn follows(amplitude: f64) -> Joint {
+        let mut joint = joint(vec![0.0; 2000]);
+        let run = &mut joint.runs[0];
+        let target: Vec<f64> = run.time.iter().map(|t| 0.5 * (1.9 * t).sin()).collect();
+        run.target = Some(Held::new(&run.time, &target));
+        let mut path = Vec::new();
+        simulate(&law(), run, &mut path);
+        run.position = path.iter().zip(&run.time).map(|(q, t)| q + amplitude * (3.1 * t).sin()).collect();
+        joint
+    }
+
+    #[test]
+    fn what_no_simulator_does_better_is_noise() {
+        let tracking = (tracking(&follows(0.0)) / 2000.0).sqrt();
+        assert!(structure(&follows(0.01 * tracking), &law()) <= 1.0);
+        assert!(structure(&follows(0.1 * tracking), &law()) > 2.0);
+    }
+
+    #[test]
+    fn what_a_clock_strays_by_is_noise() {
+        let mut joint = follows(5e-3);
+        assert!(structure(&joint, &law()) > 1.2);
+        // 10 ms at a speed of .67 rad/s, rms.
+        joint.runs[0].strays = 0.01;
+        assert!(structure(&joint, &law()) <= 1.0);
     }
 }

@@ -201,6 +201,10 @@ pub struct Run {
     pub weight: Vec<f64>,
     /// Which samples repeat the one before while the arm moves: they are not compared.
     pub stale: Vec<bool>,
+    /// Whether its stamps were counted and not read: samples then lie off them by what the recorder's clock jitters.
+    pub is_counted: bool,
+    /// How much that is, rms, as the last weighting found it, s; zero where stamps were read.
+    pub strays: f64,
     /// Samples at which the simulation starts anew from the log, in order: where no closed loop holds it to the log.
     pub restarts: Vec<usize>,
     /// Longest step of the integrator, s.

@@ -87,8 +87,33 @@ fn step_until_it_follows(law: &Law, run: &mut Run, mut length: f64, rounding: f6
     run.step_by(length);
 }
 
-/// Weights each stretch of each log by its own level of error, so that a stretch with twice the error counts a quarter.
-/// The level is no less than the encoder's step.
+/// Speed of a path at each sample, by those around it, rad/s.
+pub fn speeds(time: &[f64], path: &[f64]) -> Vec<f64> {
+    let last = path.len() - 1;
+    let of = |k: usize| {
+        let (from, to) = (k.saturating_sub(1), (k + 1).min(last));
+        (path[to] - path[from]) / (time[to] - time[from])
+    };
+    (0..=last).map(of).collect()
+}
+
+/// Part of an interval by which a recorder's clock strays at most, rms: by more, samples change places.
+const STRAYS: f64 = 0.2;
+
+/// Mean square of what a clock that jitters adds to errors, by the square of the speed there, s²: errors of samples whose stamps
+/// were counted, by least squares, in excess of those that do not go with speed. `rows` are error and speed.
+fn jitter(rows: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+    let count = rows.clone().count().max(1) as f64;
+    let mean = |of: &dyn Fn(f64, f64) -> f64| {
+        rows.clone().map(|(error, speed)| of(error * error, speed * speed)).sum::<f64>() / count
+    };
+    let (error, speed) = (mean(&|e, _| e), mean(&|_, v| v));
+    let both = mean(&|e, v| (e - error) * (v - speed));
+    (both / mean(&|_, v| (v - speed).powi(2)).max(1e-300)).max(0.0)
+}
+
+/// Weights each sample by the error that is usual there, so that one with twice the error counts a quarter: each stretch of each
+/// log has its own level, no less than the encoder's step, and where the clock was not read it rises with speed.
 pub fn weigh(joint: &mut Joint, law: &Law) {
     let step = joint.encoder_step();
     let mut path = Vec::new();
@@ -103,14 +128,36 @@ pub fn weigh(joint: &mut Joint, law: &Law) {
     let length = (STEP_PART * shortest).clamp(least, greatest);
     for run in &mut joint.runs {
         step_until_it_follows(law, run, length, step / 12f64.sqrt(), &mut path);
+        let speeds = speeds(&run.time, &path);
+        let rows = (0..path.len()).filter(|&k| !run.stale[k]);
+        let last = path.len() - 1;
+        let most = if run.is_counted { STRAYS * run.time[last] / last as f64 } else { 0.0 };
+        run.strays = jitter(rows.clone().map(|k| (path[k] - run.position[k], speeds[k]))).sqrt().min(most);
         let mut sums = [(0.0, 0.0); 2];
-        for k in (0..path.len()).filter(|&k| !run.stale[k]) {
+        for k in rows {
             let sum = &mut sums[usize::from(run.on[k])];
-            *sum = (sum.0 + (path[k] - run.position[k]).powi(2), sum.1 + 1.0);
+            *sum = (sum.0 + (path[k] - run.position[k]).powi(2) - (run.strays * speeds[k]).powi(2), sum.1 + 1.0);
         }
-        let level = sums.map(|(square, count): (f64, f64)| (square / count.max(1.0)).sqrt() + step);
+        let level = sums.map(|(square, count): (f64, f64)| (square.max(0.0) / count.max(1.0)).sqrt() + step);
         for k in 0..path.len() {
-            run.weight[k] = if run.stale[k] { 0.0 } else { step / level[usize::from(run.on[k])] };
+            let usual = level[usize::from(run.on[k])].hypot(run.strays * speeds[k]);
+            run.weight[k] = if run.stale[k] { 0.0 } else { step / usual };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_clock_strays_by_shows_in_errors_that_go_with_speed() {
+        // Readings 2 ms early or late of a joint whose speed swings, beside .5 mrad either way.
+        let speed = |k: usize| 3.0 * (0.05 * k as f64).sin();
+        let sign = |k: usize| if k * 7919 % 5 < 2 { 1.5_f64.sqrt() } else { -1.5_f64.sqrt().recip() };
+        let row = |late: f64| move |k: usize| (late * sign(k) * speed(k) + 5e-4 * sign(k + 2), speed(k));
+        let strays = |late: f64| jitter((0..2000).map(row(late))).sqrt();
+        assert!((strays(2e-3) / 2e-3 - 1.0).abs() < 0.1, "{}", strays(2e-3));
+        assert!(strays(0.0) < 2e-4, "{}", strays(0.0));
     }
 }

@@ -57,7 +57,8 @@ fn what_it_promises_comes_true_on_the_arm_that_was_found() {
     let log = poor(&model, 0.05, 3.0);
     let first = found(&model, std::slice::from_ref(&log));
     let next = first.diagnosis.next_experiment.clone().expect("something is told badly");
-    assert!(next.why.contains("stiffness at a is known to 18 %") && next.motion.contains("to about 1 %"), "{next:?}");
+    let known = format!("stiffness at a is known to {:.0} %", 100.0 * part(&first.diagnosis, "stiffness"));
+    assert!(next.why.contains(&known) && next.motion.contains("to about 1 %"), "{known}: {next:?}");
     let motion = first.trajectory.as_ref().expect("set points");
     let more = follow(&model, &first.corrected, "next.csv", motion.time.clone(), motion.position.clone()).unwrap();
     let second = found(&model, &[log, rounded(more)]);

@@ -89,24 +89,24 @@ fn follow(
     let mut hints = vec![0; n];
     let shafts: Vec<Option<Shaft>> =
         (0..n).map(|j| laws[j].and_then(|law| law.shaft(joints[j].runs[log].mass))).collect();
-    let mut data_at_rest = vec![0.0; n];
-    if shafts.iter().any(Option::is_some) {
-        model.gravity_torque(&mut data, &q, &mut data_at_rest);
-    }
     // Of joints whose motor and link turn apart, q and v are the link's.
-    let mut wound: Vec<Option<Wound>> = (0..n)
-        .map(|j| {
-            let (shaft, law) = (shafts[j]?, laws[j]?);
-            let mut state = shaft.at_rest(q[j], law[Param::Scale] * data_at_rest[j], law.link_side);
-            (state.motor[1], state.link[1]) = (v[j], v[j]);
-            Some(state)
-        })
-        .collect();
+    let mut wound: Vec<Option<Wound>> = vec![None; n];
+    let offset = |j: usize| laws[j].map_or(0.0, |law| law[Param::Offset]);
+    for j in 0..n {
+        let (Some(shaft), Some(law)) = (&shafts[j], &laws[j]) else { continue };
+        let hangs = |link: f64| {
+            let pose: Vec<f64> = (0..n).map(|i| if i == j { link } else { q[i] } - offset(i)).collect();
+            let mut weight = vec![0.0; n];
+            model.gravity_torque(&mut Data::new(model), &pose, &mut weight);
+            law[Param::Scale] * weight[j]
+        };
+        let mut state = shaft.at_rest(q[j], law.link_side, hangs);
+        (state.motor[1], state.link[1]) = (v[j], v[j]);
+        q[j] = state.link[0];
+        wound[j] = Some(state);
+    }
     let mut next = wound.clone();
     let mut rows: Vec<Option<Row>> = vec![None; n];
-    for (q, state) in q.iter_mut().zip(&wound) {
-        *q = state.map_or(*q, |state| state.link[0]);
-    }
     let step = joints.iter().map(|joint| joint.runs[log].step).fold(longest, f64::min);
     for k in first..span.end - 1 {
         let dt = time[k + 1] - time[k];
@@ -115,7 +115,7 @@ fn follow(
         for part in 0..parts as usize {
             let t = time[k] + part as f64 * h;
             for j in 0..n {
-                turned[j] = q[j] - laws[j].map_or(0.0, |law| law[Param::Offset]);
+                turned[j] = q[j] - offset(j);
             }
             model.mass_matrix(&mut data, &turned, &mut mass);
             model.bias(&mut data, &turned, &v, &mut bias);

@@ -41,15 +41,19 @@ pub struct Spread {
     covariance: DMatrix<f64>,
 }
 
-/// Change of the errors where the loop answers by [`LOOP`] later: q(t − τ) is q − τ q̇, and q̇(t − τ) is q̇ − τ q̈.
-fn late(fit: &Fit, joint: &Joint) -> Vec<f64> {
-    let mut law = fit.law;
-    law[Param::Armature] -= LOOP * law[Param::Damping];
-    law[Param::Damping] -= LOOP * law[Param::Feedback];
-    let [mut moved, mut here] = [Vec::new(), Vec::new()];
+/// Changes of the errors where the loop's stiffness and where its damping answers by [`LOOP`] later: q(t − τ) is q − τ q̇, and
+/// q̇(t − τ) is q̇ − τ q̈. A simulator may take one at the beginning of a step and the other at its end.
+fn late(fit: &Fit, joint: &Joint) -> [Vec<f64>; 2] {
+    let [mut stiffness, mut damping] = [fit.law; 2];
+    stiffness[Param::Damping] -= LOOP * stiffness[Param::Feedback];
+    damping[Param::Armature] -= LOOP * damping[Param::Damping];
+    let mut here = Vec::new();
     errors(&fit.law, &joint.runs, &mut here);
-    errors(&law, &joint.runs, &mut moved);
-    moved.iter().zip(&here).map(|(moved, here)| moved - here).collect()
+    [stiffness, damping].map(|law| {
+        let mut moved = Vec::new();
+        errors(&law, &joint.runs, &mut moved);
+        moved.iter().zip(&here).map(|(moved, here)| moved - here).collect()
+    })
 }
 
 impl Spread {
@@ -80,9 +84,11 @@ impl Spread {
         // At the minimum the pulls of all blocks come to nothing in as many directions as there are parameters.
         let left = 1.0 - p as f64 / fit.errors.len().div_ceil(length).max(p + 2) as f64;
         let mut covariance = &inverse * pulls * &inverse / left;
-        let (_, pull) = normal(&fit.sensitivity, &late(fit, joint));
-        let shift = &inverse * pull;
-        covariance += &shift * shift.transpose();
+        for moved in late(fit, joint) {
+            let (_, pull) = normal(&fit.sensitivity, &moved);
+            let shift = &inverse * pull;
+            covariance += &shift * shift.transpose();
+        }
         Spread { free: fit.free.clone(), values: fit.free.iter().map(|&param| fit.law[param]).collect(), covariance }
     }
 

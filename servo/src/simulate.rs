@@ -79,11 +79,17 @@ fn turn(angle: f64) -> (f64, f64) {
     (sin, 1.0 - 0.5 * square * (1.0 - square / 12.0 * (1.0 - square / 30.0)))
 }
 
-/// The weight on a link that the law turned to `angle`, N m, with what the others' motion adds.
+/// The weight on a link that the law turned to `angle`, N m.
+#[inline]
+fn gravity(around: &Around, angle: f64) -> f64 {
+    let (sin, cos) = turn(angle - around.position);
+    around.gravity * cos + around.slope * sin
+}
+
+/// The same with what the others' motion adds.
 #[inline]
 fn weight(around: &Around, angle: f64) -> f64 {
-    let (sin, cos) = turn(angle - around.position);
-    around.gravity * cos + around.slope * sin + around.coupling
+    gravity(around, angle) + around.coupling
 }
 
 /// Simulates; `see` is told of each step where it lies, in samples, and the link's state before and after it.
@@ -122,7 +128,10 @@ fn follow(law: &Law, run: &Run, out: &mut Vec<f64>, mut see: impl FnMut([f64; 2]
 fn follow_wound(law: &Law, shaft: &Shaft, run: &Run, out: &mut Vec<f64>, mut see: impl FnMut([f64; 2], State, State)) {
     let sigma = law[Param::Scale];
     let shown = |state: &Wound| if law.link_side { state.link[0] } else { state.motor[0] };
-    let mut state = shaft.at_rest(run.position[0], sigma * run.around.at(0).gravity, law.link_side);
+    let at_rest = |k: usize, q: f64| {
+        shaft.at_rest(q, law.link_side, |link| sigma * gravity(&run.around.at(k), link - law[Param::Offset]))
+    };
+    let mut state = at_rest(0, run.position[0]);
     let (mut hint, mut restart) = (0, 0);
     out.push(shown(&state));
     for step in run.steps() {
@@ -130,7 +139,7 @@ fn follow_wound(law: &Law, shaft: &Shaft, run: &Run, out: &mut Vec<f64>, mut see
         if span[0] == 0.0 && run.restarts.get(restart) == Some(k) {
             restart += 1;
             let (q, v) = run.state(*k);
-            state = shaft.at_rest(q, sigma * run.around.at(*k).gravity, law.link_side);
+            state = at_rest(*k, q);
             (state.motor[1], state.link[1]) = (v, v);
         }
         let weight = weight(around, state.link[0] + 0.5 * h * state.link[1] - law[Param::Offset]);

@@ -12,6 +12,9 @@ const DAMPING: f64 = 0.05;
 /// Frequency at which a link swings on the teeth that end its play, rad/s: 20 Hz, as hard as steps of 1 to 2 ms follow.
 pub const CONTACT: f64 = 125.0;
 
+/// Steps to where a link hangs on its spring: a spring twice as stiff as gravity comes to a thousandth of its turn.
+const HANGS: usize = 10;
+
 /// What lies between motor and link, in units of w.
 #[derive(Debug, Clone, Copy)]
 pub struct Shaft {
@@ -61,9 +64,15 @@ impl Shaft {
         x - x.clamp(-self.half_gap, self.half_gap)
     }
 
-    /// State at rest under a weight on the link, in units of w, that an encoder on one of the sides shows at `measured`.
-    pub fn at_rest(&self, measured: f64, weight: f64, link_side: bool) -> Wound {
-        let x = weight / self.stiffness + self.half_gap * if weight == 0.0 { 0.0 } else { weight.signum() };
+    /// State at rest under the weight of the link at its angle, in units of w, that an encoder on one of the sides shows at
+    /// `measured`.
+    pub fn at_rest(&self, measured: f64, link_side: bool, weight: impl Fn(f64) -> f64) -> Wound {
+        let mut x = 0.0;
+        // A link that hangs on its spring turns by that, and its weight with it.
+        for _ in 0..if link_side { 1 } else { HANGS } {
+            let weight = weight(if link_side { measured } else { measured - x });
+            x = weight / self.stiffness + self.half_gap * if weight == 0.0 { 0.0 } else { weight.signum() };
+        }
         let (motor, link) = if link_side { (measured + x, measured) } else { (measured, measured - x) };
         Wound { motor: [motor, 0.0], link: [link, 0.0] }
     }
@@ -144,7 +153,20 @@ mod tests {
         assert!((path[300].link[1] - 0.05).abs() < 1e-9, "it flies freely for .4 s");
         assert!(run(&law, start, 0.02, 8000, 5e-4).iter().all(|state| state.link[0].abs() < 0.0215));
         let shaft = law.shaft(0.02).unwrap();
-        let rest = shaft.at_rest(0.3, 0.45, false);
+        let rest = shaft.at_rest(0.3, false, |_| 0.45);
         assert!((rest.link[0] - (0.3 - 0.02 - 0.45 / (0.1 * 0.02 * 150.0 * 150.0))).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_link_hangs_where_its_weight_there_stretches_the_spring() {
+        let shaft = law(30.0, 0.0).shaft(0.02).unwrap();
+        // σ M ω² = 1.8: half of that is the weight of the link when it lies level.
+        let weight = |link: f64| 0.9 * link.sin();
+        for link_side in [false, true] {
+            let rest = shaft.at_rest(0.8, link_side, weight);
+            let stretch = rest.motor[0] - rest.link[0];
+            assert!((1.8 * stretch - weight(rest.link[0])).abs() < 1e-3, "{link_side}: {rest:?}");
+            assert_eq!(if link_side { rest.link[0] } else { rest.motor[0] }, 0.8);
+        }
     }
 }

@@ -5,8 +5,9 @@ use crate::excerpt;
 use crate::fit::{Fit, fit};
 use crate::kinds::Kind;
 use crate::law::{Law, Param};
-use crate::needless::{drop_needless, exchange, ties};
+use crate::needless::{BEYOND, drop_needless, exchange, ties};
 use crate::prepare::Joint;
+use crate::rest::lasting;
 use crate::run::Signal;
 use crate::weigh::{independent, weigh};
 
@@ -202,7 +203,7 @@ fn choose_by_all(joint: &mut Joint, from: &From) -> Chosen {
         let free: Vec<Param> = best.free.iter().copied().filter(|p| *p != Param::Latency).collect();
         let poor = fit(&without, &free, &joint.runs, &joint.ranges, TRIAL);
         let nats = 0.5 * samples * (poor.cost / best.cost.max(1e-300)).ln() - 0.5 * samples.ln() - Kind::Delay.cost();
-        let taken = nats > TAKEN;
+        let taken = nats > TAKEN && poor.cost - best.cost > BEYOND * lasting(joint, &best.errors);
         why.push(Comparison { proposed: Kind::Delay, nats, taken, last: true });
         if taken {
             found.push((Kind::Delay, nats));

@@ -138,7 +138,8 @@ pub fn diagnose(
         .zip(&all)
         .zip(&coarse)
         .map(|((c, joint), coarse)| {
-            let spread = Spread::of(&c.as_ref()?.fit, joint);
+            let fit = &c.as_ref()?.fit;
+            let spread = Spread::of(fit, joint).with_what_lasts(fit, joint);
             Some(coarse.map_or(spread.clone(), |coarse| spread.with_steps_from(&coarse, FINER)))
         })
         .collect();

@@ -6,7 +6,9 @@ use crate::choose::{Chosen, restore};
 use crate::fit::Fit;
 use crate::kinds::Kind;
 use crate::law::Param;
+use crate::needless::BEYOND;
 use crate::prepare::Joint;
+use crate::rest::lasting;
 use crate::settle::{Account, LOCAL, STEPS, Search, Settled, fit_all, misfit, worth};
 use crate::weigh::{independent, least, tracking};
 use crate::whole::{Found, Whole, around, put};
@@ -94,16 +96,25 @@ pub fn look(
         let Some((nats, settled, saved)) = tried.into_iter().next() else { continue };
         let falls = |j: usize| {
             let (rich, poor) = (settled.fits[j].as_ref()?, fits[j].as_ref()?);
-            Some((poor.cost - rich.cost, least(rich.cost, perfect[j]), poor.cost))
+            let least = least(rich.cost, perfect[j]).max(BEYOND * lasting(&joints[j], &rich.errors));
+            Some((poor.cost - rich.cost, least, poor.cost))
         };
         let falls: Vec<(f64, f64, f64)> = (0..joints.len()).filter_map(falls).collect();
         let share = falls.iter().map(|(fall, _, poor)| fall / poor.max(1e-300)).fold(0.0, f64::max);
         let relevant = falls.iter().any(|(fall, least, _)| fall > least) || saved > 0.0;
         // Its numbers must lie off nothing as well: a fit may fall by what they do not do.
         let nats = nats.min(settled.nats() - price + saved);
-        let possible = search.is_possible(&settled.values);
-        if nats > TAKEN && relevant && possible && outcome.found.as_ref().is_none_or(|found| nats > found.nats) {
+        if nats > TAKEN
+            && relevant
+            && search.is_possible(&settled.values)
+            && outcome.found.as_ref().is_none_or(|found| nats > found.nats)
+        {
             let (covariance, laws) = (search.covariance(&settled), settled.laws());
+            // A body has a mass: a moment alone is what a bias or a zero is to one joint.
+            let told = 0.5 * settled.values[0].powi(2) / covariance[(0, 0)].max(1e-300);
+            if whole == Whole::Payload && told < TAKEN {
+                continue;
+            }
             outcome.found = Some(Found { whole, values: settled.values, covariance, nats, share, laws });
         }
     }

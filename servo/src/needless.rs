@@ -4,7 +4,12 @@ use crate::choice::{Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
 use crate::fit::{Fit, cost, normal};
 use crate::interval::Spread;
 use crate::kinds::Kind;
+use crate::rest::lasting;
 use crate::weigh::independent;
+
+/// A kind lowers the squared error by this many times what lasts of it without a cause: what is behind that may be behind the kind.
+/// Of servo arms with one unknown law kinds that are not there gain .2 to 4 times as much, of others those that are there 15 and more.
+pub(crate) const BEYOND: f64 = 5.0;
 
 /// Drops what the fit does not miss; what stays, with the nats it is worth, and the account without its spring or play.
 pub fn drop_needless(
@@ -13,6 +18,8 @@ pub fn drop_needless(
     best: &mut Fit,
     why: &mut Vec<Comparison>,
 ) -> (Vec<(Kind, f64)>, Option<Poorer>) {
+    // Of the richest account: a poorer one may lack what is there.
+    let least = BEYOND * lasting(choice.joint, &best.errors);
     loop {
         let samples = independent(choice.joint, &best.errors);
         let mut worth = Vec::new();
@@ -21,7 +28,8 @@ pub fn drop_needless(
         let spread = Spread::of(best, choice.joint);
         for &kind in kinds.iter() {
             let off = choice.off_nothing(best, kind, samples, &spread);
-            if let Some(nats) = choice.surely(best, kinds, kind, samples, &missing).filter(|_| off > TAKEN) {
+            let surely = choice.surely(best, kinds, kind, samples, &missing);
+            if let Some((nats, _)) = surely.filter(|(_, loss)| off > TAKEN && *loss > least) {
                 sure.push((kind, nats));
                 continue;
             }
@@ -38,7 +46,7 @@ pub fn drop_needless(
             let weightless = kind == Kind::Bias
                 && !Spread::of(best, choice.joint).scale_is_known()
                 && Spread::of(&poor, choice.joint).scale_is_known();
-            let relevant = choice.relevant(best, &poor) && !weightless;
+            let relevant = choice.relevant(best, &poor) && poor.cost - best.cost > least && !weightless;
             worth.push((kind, nats, relevant, poor, without));
         }
         let needless = worth
@@ -170,8 +178,9 @@ impl Choice<'_> {
         })
     }
 
-    /// Nats that a kind is worth where there can be no doubt of it; `None` where a fit without it must say.
-    fn surely(&self, best: &Fit, kinds: &[Kind], kind: Kind, samples: f64, missing: &Missing) -> Option<f64> {
+    /// Nats that a kind is worth where there can be no doubt of it, and the squared error without it beyond that with it; `None`
+    /// where a fit without it must say.
+    fn surely(&self, best: &Fit, kinds: &[Kind], kind: Kind, samples: f64, missing: &Missing) -> Option<(f64, f64)> {
         // Beside a limit or a dead band no kind is felt evenly.
         let is_even = kind.is_linear() && !kinds.iter().any(|other| other.is_threshold());
         if !is_even || kind == Kind::Bias || kinds.iter().any(|other| other.base() == Some(kind)) {
@@ -180,7 +189,7 @@ impl Choice<'_> {
         let (loss, more) = self.clear_loss(best, &[kind], missing)?;
         let nats =
             0.5 * samples * ((best.cost + loss) / best.cost.max(1e-300)).ln() - 0.5 * more * samples.ln() - kind.cost();
-        (nats > SURE).then_some(nats)
+        (nats > SURE).then_some((nats, loss))
     }
 }
 

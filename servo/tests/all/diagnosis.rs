@@ -361,6 +361,29 @@ fn rollouts_of_the_corrected_arm_stay_nearer_and_it_follows_set_points() {
     assert!(!log.has_effort());
 }
 
+/// Joints that lag by the square of their speed, as a tip does that drags through water, and swing a little: no law of a joint says so.
+#[test]
+fn what_lasts_without_a_cause_calls_up_no_effect() {
+    let model = model();
+    let mut logs = logs(&model, [6.0, 3.0], |_| {});
+    for log in &mut logs {
+        for (j, row) in log.position.iter_mut().enumerate() {
+            let speed = |k: usize| {
+                let (from, to) = (k.saturating_sub(4), (k + 4).min(row.len() - 1));
+                (row[to] - row[from]) / (log.time[to] - log.time[from])
+            };
+            let lag: Vec<f64> = (0..row.len()).map(|k| 0.03 * speed(k) * speed(k).abs()).collect();
+            for ((q, lag), t) in row.iter_mut().zip(lag).zip(&log.time) {
+                let swing = 0.006 * ((6.3 + 2.0 * j as f64) * t).sin();
+                *q = ((*q - lag + swing) / TICK).round() * TICK;
+            }
+        }
+    }
+    let diagnosis = diagnose(&model, &logs, &Given::default(), Vec::new(), &|_, _| {}).unwrap().diagnosis;
+    assert!(diagnosis.effects.is_empty(), "{:?}", diagnosis.effects);
+    assert_eq!(diagnosis.verdict, "unknown_effect");
+}
+
 #[test]
 fn a_joint_that_rests_is_not_excited() {
     let model = model();

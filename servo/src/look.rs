@@ -96,12 +96,15 @@ pub fn look(
         let Some((nats, settled, saved)) = tried.into_iter().next() else { continue };
         let falls = |j: usize| {
             let (rich, poor) = (settled.fits[j].as_ref()?, fits[j].as_ref()?);
-            let least = least(rich.cost, perfect[j]).max(BEYOND * lasting(&joints[j], &rich.errors));
-            Some((poor.cost - rich.cost, least, poor.cost))
+            let (fall, least) = (poor.cost - rich.cost, least(rich.cost, perfect[j]));
+            Some((fall / poor.cost.max(1e-300), fall > least, fall / lasting(&joints[j], &rich.errors).max(1e-300)))
         };
-        let falls: Vec<(f64, f64, f64)> = (0..joints.len()).filter_map(falls).collect();
-        let share = falls.iter().map(|(fall, _, poor)| fall / poor.max(1e-300)).fold(0.0, f64::max);
-        let relevant = falls.iter().any(|(fall, least, _)| fall > least) || saved > 0.0;
+        let falls: Vec<(f64, bool, f64)> = (0..joints.len()).filter_map(falls).collect();
+        let share = falls.iter().map(|(part, _, _)| *part).fold(0.0, f64::max);
+        // At one joint it is held against what lasts as a kind of that joint is. Joints that agree say more: what lasts beside the
+        // first effect of an arm may be its second.
+        let at_least = |times: f64| falls.iter().filter(|(_, shows, beyond)| *shows && *beyond > times).count();
+        let relevant = at_least(BEYOND) > 0 || at_least(1.0) > 1;
         // Its numbers must lie off nothing as well: a fit may fall by what they do not do.
         let nats = nats.min(settled.nats() - price + saved);
         if nats > TAKEN

@@ -102,10 +102,13 @@ fn curve(effect: &servo::FoundEffect, joint: &str, top: f64) -> Option<EffectCur
         "stribeck_friction" => &["coulomb", "static", "stribeck_velocity"],
         _ => return None,
     };
+    // A joint that creeps passes zero on a slope.
+    let creep = effect.parameters.get("creep_velocity").and_then(|own| own.at(joint)).map(|own| own.value);
+    let sign = |v: f64| creep.map_or(v.signum(), |creep| (v / creep).clamp(-1.0, 1.0));
     let law = |p: &[f64], v: f64| match p {
         [viscous] if effect.kind == "viscous_friction" => viscous * v,
-        [coulomb] => coulomb * v.signum(),
-        [coulomb, at_rest, fade] => (coulomb + (at_rest - coulomb) * (-(v / fade).powi(2)).exp()) * v.signum(),
+        [coulomb] => coulomb * sign(v),
+        [coulomb, at_rest, fade] => (coulomb + (at_rest - coulomb) * (-(v / fade).powi(2)).exp()) * sign(v),
         _ => f64::NAN,
     };
     let found: Vec<&servo::Estimate> =
@@ -173,6 +176,23 @@ mod tests {
         assert_eq!(curve.unit, "N m per N m/rad");
         // Where the logs do not bound a parameter, no band is drawn.
         assert!(curves(&[stribeck(None)], &BTreeMap::from([("a".into(), 1.0)]))[0].band.is_empty());
+    }
+
+    #[test]
+    fn friction_of_a_joint_that_creeps_passes_zero_on_a_slope() {
+        let at_rest = |effect: &servo::FoundEffect| {
+            let [curve] =
+                curves(std::slice::from_ref(effect), &BTreeMap::from([("a".into(), 1.0)])).try_into().unwrap();
+            let nearest = curve.law.iter().min_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));
+            nearest.unwrap()[1].abs()
+        };
+        let mut effect = stribeck(Some(1.1));
+        assert!(at_rest(&effect) > 1.9);
+        let creep =
+            servo::Estimate { value: 0.3, ci95: [Some(0.2), Some(0.4)], unit: "rad/s".into(), determined: true };
+        let creep = servo::Parameter::PerJoint(BTreeMap::from([("a".to_owned(), creep)]));
+        effect.parameters.insert("creep_velocity".into(), creep);
+        assert!(at_rest(&effect) < 0.1);
     }
 
     #[test]

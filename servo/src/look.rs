@@ -113,9 +113,7 @@ pub fn look(
             && outcome.found.as_ref().is_none_or(|found| nats > found.nats)
         {
             let (covariance, laws) = (search.covariance(&settled), settled.laws());
-            // A body has a mass: a moment alone is what a bias or a zero is to one joint.
-            let told = 0.5 * settled.values[0].powi(2) / covariance[(0, 0)].max(1e-300);
-            if whole == Whole::Payload && told < TAKEN {
+            if !whole.is_told(&settled.values, &covariance) {
                 continue;
             }
             outcome.found = Some(Found { whole, values: settled.values, covariance, nats, share, laws });

@@ -17,12 +17,16 @@ const MODELLED: f64 = 0.015;
 /// and samples repeat.
 const WHITE: f64 = 2.5;
 
+fn samples_of_a_span(joint: &Joint) -> usize {
+    ((SPAN / joint.dt.max(1e-4)).round() as usize).max(2)
+}
+
 /// What is left of a joint against what noise would leave: up to one it is noise. Root mean squares of means over [`SPAN`]; the
 /// noise of a sample is told by the change of the error from one to the next. A clock that strays moves a whole answer to a step of
 /// the set point: up to that, too, it is noise.
 pub fn structure(joint: &Joint, law: &Law) -> f64 {
     let rounding = joint.encoder_step() / 12f64.sqrt();
-    let count = ((SPAN / joint.dt.max(1e-4)).round() as usize).max(2);
+    let count = samples_of_a_span(joint);
     let mut path = Vec::new();
     let mut strays = Vec::new();
     let errors: Vec<Vec<f64>> = joint
@@ -50,7 +54,7 @@ pub fn structure(joint: &Joint, law: &Law) -> f64 {
 /// Part of the squared error of a fit that lasts: means over [`SPAN`] beyond what noise that forgets, rounding and a clock that
 /// strays leave of them. `errors` are weighted, in the order of the joint's runs.
 pub fn lasting(joint: &Joint, errors: &[f64]) -> f64 {
-    let count = ((SPAN / joint.dt.max(1e-4)).round() as usize).max(2);
+    let count = samples_of_a_span(joint);
     let step = joint.encoder_step();
     let (mut from, mut lasting) = (0, 0.0);
     for run in &joint.runs {

@@ -3,6 +3,7 @@
 //! Such an effect changes what the arm does to each joint, its surroundings.
 
 use crate::around::{Motion, surroundings};
+use crate::choice::TAKEN;
 use crate::kinds::Kind;
 use crate::law::Law;
 use crate::prepare::Joint;
@@ -135,6 +136,11 @@ impl Whole {
         [first].iter().chain(&values[1..]).zip(bounds).map(|(value, [least, most])| value.clamp(least, most)).collect()
     }
 
+    /// Whether the logs tell what makes it what it is: a body has a mass, as a moment alone is what a bias or a zero is to one joint.
+    pub(crate) fn is_told(self, values: &[f64], covariance: &DMatrix<f64>) -> bool {
+        self != Whole::Payload || 0.5 * values[0].powi(2) / covariance[(0, 0)].max(1e-300) >= TAKEN
+    }
+
     /// Whether a number lies at its bound: something else is there. What turns about itself by nothing is a point, and may be.
     pub(crate) fn at_bound(self, model: &Model, values: &[f64]) -> bool {
         let bounds = self.bounds(model, values[0]);
@@ -189,4 +195,18 @@ pub(crate) fn shifted(base: &Around, plain: &Around, probed: &Around) -> Around 
     };
     let log = |((a, b), c): ((&Vec<_>, &Vec<_>), &Vec<_>)| a.iter().zip(b).zip(c).map(one).collect();
     base.iter().zip(plain).zip(probed).map(log).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_body_whose_mass_may_be_none_is_not_told() {
+        let values = [0.147, 0.01, 0.0, 0.0, 0.0];
+        let known_to = |deviation: f64| DMatrix::from_diagonal_element(5, 5, deviation * deviation);
+        assert!(Whole::Payload.is_told(&values, &known_to(0.02)));
+        assert!(!Whole::Payload.is_told(&values, &known_to(0.07)));
+        assert!(Whole::Tilt.is_told(&values[..2], &known_to(0.2)));
+    }
 }

@@ -71,6 +71,14 @@ fn kinds(model: &Model, logs: &[Episode]) -> (Vec<String>, gapscope_servo::Outco
     (outcome.diagnosis.effects.iter().map(|effect| effect.kind.clone()).collect(), outcome)
 }
 
+/// The corrected arm as it reads back from what is written, which is the same.
+fn read_back(model: &Model, outcome: &gapscope_servo::Outcome) -> ServoModel {
+    let text = serde_json::to_string(&outcome.corrected).unwrap();
+    let read = ServoModel::from_json(&text, model).unwrap();
+    assert_eq!(read, outcome.corrected);
+    read
+}
+
 #[test]
 fn a_servo_without_effects_is_found_and_nothing_is_claimed() {
     let model = model();
@@ -106,8 +114,7 @@ fn dry_friction_and_a_rotor_are_found_with_their_sizes() {
     assert!((of("armature", "armature", "b") / 0.009 - 1.0).abs() < 0.15);
     assert!(outcome.diagnosis.shrink.position.shrink.unwrap() > 0.9);
     // What is written reads back to the same model.
-    let text = serde_json::to_string(&outcome.corrected).unwrap();
-    assert_eq!(ServoModel::from_json(&text, &model).unwrap(), outcome.corrected);
+    read_back(&model, &outcome);
 }
 
 #[test]
@@ -128,9 +135,7 @@ fn friction_under_which_a_joint_creeps_is_told_with_the_speed_of_it() {
         let creep = of(&outcome.diagnosis, "coulomb_friction", "creep_velocity", joint);
         assert!((creep / 0.05 - 1.0).abs() < 0.2, "{joint}: {creep}");
     }
-    let text = serde_json::to_string(&outcome.corrected).unwrap();
-    let read = ServoModel::from_json(&text, &model).unwrap();
-    assert_eq!(read, outcome.corrected);
+    let read = read_back(&model, &outcome);
     // The law of the corrected arm creeps as well.
     let mut all = joints(&model, &logs(&model, [6.0, 3.0], |_| {}), &Given::default());
     assert!(read.laws(&mut all).unwrap().iter().all(|law| (law[Param::Creep] / 0.05 - 1.0).abs() < 0.2));
@@ -151,8 +156,7 @@ fn dry_friction_under_a_derivative_gain_on_the_error_is_plain_dry_friction() {
     assert_eq!(kinds, ["coulomb_friction"]);
     let found = outcome.diagnosis.drive["b"].constants["feedforward"].value;
     assert!((found / (0.06 * 3.0) - 1.0).abs() < 0.1, "{found}");
-    let text = serde_json::to_string(&outcome.corrected).unwrap();
-    assert_eq!(ServoModel::from_json(&text, &model).unwrap(), outcome.corrected);
+    read_back(&model, &outcome);
 }
 
 #[test]
@@ -227,8 +231,7 @@ fn play_is_found_with_its_width() {
         outcome.diagnosis.effects
     );
     // What is written reads back to the same model, the encoder's side included.
-    let text = serde_json::to_string(&outcome.corrected).unwrap();
-    assert_eq!(ServoModel::from_json(&text, &model).unwrap(), outcome.corrected);
+    read_back(&model, &outcome);
     assert!(outcome.corrected.drive["a"].link_side);
 }
 

@@ -1,13 +1,12 @@
 //! Which effects a joint has: kinds are added, exchanged and dropped while the score of the fit rises.
 
-use crate::choice::{Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
+use crate::choice::{Bar, Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
 use crate::excerpt;
 use crate::fit::{Fit, fit};
 use crate::kinds::Kind;
 use crate::law::{Law, Param};
-use crate::needless::{BEYOND, drop_needless, exchange, ties};
+use crate::needless::{drop_needless, exchange, ties};
 use crate::prepare::Joint;
-use crate::rest::lasting;
 use crate::run::Signal;
 use crate::weigh::{independent, weigh};
 
@@ -67,7 +66,7 @@ impl Chosen {
 }
 
 /// A choice that begins with what most servos have, and the kinds that it has to choose from.
-fn begin(joint: &mut Joint) -> (Choice<'_>, Vec<Kind>, Vec<Kind>) {
+fn begin(joint: &mut Joint, bar: Bar) -> (Choice<'_>, Vec<Kind>, Vec<Kind>) {
     let given = joint.given;
     let mut base: Vec<Param> = [Param::Scale, Param::Damping].into_iter().filter(|p| !given[*p as usize]).collect();
     let closed = joint.runs.iter().any(|run| run.target.is_some());
@@ -87,7 +86,7 @@ fn begin(joint: &mut Joint) -> (Choice<'_>, Vec<Kind>, Vec<Kind>) {
         law[*param] = 0.1 * joint.ranges.scale[*param as usize];
     }
     law[Param::Bias] = 0.0;
-    (Choice { joint, base, perfect: 0.0, bare: law }, kinds, possible)
+    (Choice { joint, base, perfect: 0.0, bare: law, bar }, kinds, possible)
 }
 
 /// Where a choice begins.
@@ -112,9 +111,9 @@ impl From {
 
 /// Finds what one joint has, by an excerpt of long logs; its parameters are those of all. Leaves the weights of its runs as the
 /// last fit had them.
-pub fn choose(joint: &mut Joint, from: &From) -> Chosen {
-    let Some(mut part) = excerpt::of_joint(joint) else { return choose_by_all(joint, from) };
-    let mut found = choose_by_all(&mut part, from);
+pub fn choose(joint: &mut Joint, from: &From, bar: Bar) -> Chosen {
+    let Some(mut part) = excerpt::of_joint(joint) else { return choose_by_all(joint, from, bar) };
+    let mut found = choose_by_all(&mut part, from, bar);
     weigh(joint, &found.fit.law);
     let refit = |own: &Fit, rounds: usize| fit(&own.law, &own.free, &joint.runs, &joint.ranges, rounds);
     found.fit = refit(&found.fit, FULL);
@@ -127,7 +126,7 @@ pub fn choose(joint: &mut Joint, from: &From) -> Chosen {
 
 /// The fit of an account, from a law on, with those of some kinds that it misses: the one that is missed most first.
 pub fn restore(joint: &mut Joint, law: &Law, mut kinds: Vec<Kind>, mut among: Vec<Kind>) -> Fit {
-    let (choice, _, _) = begin(joint);
+    let (choice, _, _) = begin(joint, Bar::Noise);
     let mut best = choice.fit(law, &kinds, None, TRIAL);
     loop {
         let with = |(at, &kind): (usize, &Kind)| {
@@ -143,9 +142,9 @@ pub fn restore(joint: &mut Joint, law: &Law, mut kinds: Vec<Kind>, mut among: Ve
     }
 }
 
-fn choose_by_all(joint: &mut Joint, from: &From) -> Chosen {
+fn choose_by_all(joint: &mut Joint, from: &From, bar: Bar) -> Chosen {
     let given = joint.given;
-    let (mut choice, mut kinds, possible) = begin(joint);
+    let (mut choice, mut kinds, possible) = begin(joint, bar);
     let mut why = Vec::new();
     let start = match from {
         From::Nothing => choice.bare,
@@ -192,6 +191,7 @@ fn choose_by_all(joint: &mut Joint, from: &From) -> Chosen {
     let samples = independent(choice.joint, &best.errors);
     let delay_is_free = kinds.contains(&Kind::Delay);
     let mut found = kept;
+    let least = choice.beyond(&best.errors);
     let joint = choice.joint;
     // A latency of the drive that shows beyond the logger's own order is a delay to any simulator without one.
     if !given[Param::Latency as usize]
@@ -203,7 +203,7 @@ fn choose_by_all(joint: &mut Joint, from: &From) -> Chosen {
         let free: Vec<Param> = best.free.iter().copied().filter(|p| *p != Param::Latency).collect();
         let poor = fit(&without, &free, &joint.runs, &joint.ranges, TRIAL);
         let nats = 0.5 * samples * (poor.cost / best.cost.max(1e-300)).ln() - 0.5 * samples.ln() - Kind::Delay.cost();
-        let taken = nats > TAKEN && poor.cost - best.cost > BEYOND * lasting(joint, &best.errors);
+        let taken = nats > TAKEN && poor.cost - best.cost > least;
         why.push(Comparison { proposed: Kind::Delay, nats, taken, last: true });
         if taken {
             found.push((Kind::Delay, nats));

@@ -3,7 +3,7 @@
 
 use crate::arm::{simulate_arm, trace_arm};
 use crate::around::{Motion, motion};
-use crate::choice::FULL;
+use crate::choice::{Bar, FULL};
 use crate::choose::{Chosen, From, choose};
 use crate::claims::{confidence, drive, effects, reasons, whole_effect};
 use crate::clock::nominal_rate;
@@ -74,8 +74,9 @@ pub fn diagnose(
     let mut all = joints(model, episodes, given);
     let excited = all.iter().any(|joint| joint.moved);
     progress("what drives each joint", 0.1);
-    let nothing = vec![From::Nothing; all.len()];
-    let mut chosen = choose_all(&mut all, &nothing);
+    // An arm of one joint has nothing that the joint alone does not say.
+    let first = if all.len() == 1 { Bar::WhatLasts } else { Bar::Noise };
+    let mut chosen = choose_all(&mut all, first);
     progress("what the whole arm has", 0.5);
     // The search goes by what was measured: an arm without the effect moves otherwise than the one that has it.
     let moved = motions(model, &all, &vec![None; all.len()], episodes);
@@ -221,8 +222,9 @@ pub fn diagnose(
 /// Constants that an effect of the whole arm may be behind.
 const CONSTANT: [Kind; 2] = [Kind::Bias, Kind::Offset];
 
-fn choose_all(joints: &mut [Joint], from: &[From]) -> Vec<Option<Chosen>> {
-    joints.par_iter_mut().zip(from).map(|(joint, from)| joint.moved.then(|| choose(joint, from))).collect()
+/// Chooses all joints from nothing on.
+fn choose_all(joints: &mut [Joint], bar: Bar) -> Vec<Option<Chosen>> {
+    joints.par_iter_mut().map(|joint| joint.moved.then(|| choose(joint, &From::Nothing, bar))).collect()
 }
 
 /// Chooses joints anew; those that stay keep their account, and get its numbers in their surroundings.
@@ -230,7 +232,7 @@ fn choose_anew(joints: &mut [Joint], from: &[From], stay: &[bool], chosen: &mut 
     let each = joints.par_iter_mut().zip(chosen).zip(from.par_iter().zip(stay));
     each.filter(|((joint, _), _)| joint.moved).for_each(|((joint, own), (from, stay))| match own {
         Some(own) if *stay => own.fit = fit(&own.fit.law, &own.fit.free, &joint.runs, &joint.ranges, FULL),
-        _ => *own = Some(choose(joint, from)),
+        _ => *own = Some(choose(joint, from, Bar::WhatLasts)),
     });
 }
 
@@ -280,7 +282,7 @@ fn find_wholes(
         }
         real = there;
         surround(joints, &real, moved);
-        *chosen = choose_all(joints, &vec![From::Nothing; joints.len()]);
+        *chosen = choose_all(joints, Bar::Noise);
         found.push(next);
     }
 }

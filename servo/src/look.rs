@@ -1,12 +1,11 @@
 //! The search for effects of the whole arm: what they are worth beside what its joints were found to have, and in its place.
 
 use crate::around::Motion;
-use crate::choice::TAKEN;
+use crate::choice::{BEYOND, TAKEN};
 use crate::choose::{Chosen, restore};
 use crate::fit::Fit;
 use crate::kinds::Kind;
 use crate::law::Param;
-use crate::needless::BEYOND;
 use crate::prepare::Joint;
 use crate::rest::lasting;
 use crate::settle::{Account, LOCAL, STEPS, Search, Settled, fit_all, misfit, worth};

@@ -4,12 +4,7 @@ use crate::choice::{Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
 use crate::fit::{Fit, cost, normal};
 use crate::interval::Spread;
 use crate::kinds::Kind;
-use crate::rest::lasting;
 use crate::weigh::independent;
-
-/// A kind lowers the squared error by this many times what lasts of it without a cause: what is behind that may be behind the kind.
-/// Of servo arms with one unknown law kinds that are not there gain .2 to 4 times as much, of others those that are there 15 and more.
-pub(crate) const BEYOND: f64 = 5.0;
 
 /// Drops what the fit does not miss; what stays, with the nats it is worth, and the account without its spring or play.
 pub fn drop_needless(
@@ -19,7 +14,7 @@ pub fn drop_needless(
     why: &mut Vec<Comparison>,
 ) -> (Vec<(Kind, f64)>, Option<Poorer>) {
     // Of the richest account: a poorer one may lack what is there.
-    let least = BEYOND * lasting(choice.joint, &best.errors);
+    let least = choice.beyond(&best.errors);
     loop {
         let samples = independent(choice.joint, &best.errors);
         let mut worth = Vec::new();

@@ -89,8 +89,8 @@ pub fn diagnose(
         // joints are looked at beside the motion of the link behind it.
         let rigid: Vec<From> = chosen.iter().map(|own| own.as_ref().map_or(From::Nothing, Chosen::rigid)).collect();
         drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
-        // One joint alone has no others whose motion it feels.
-        if all.len() == 1 {
+        // One joint alone feels no other's motion.
+        if all.len() == 1 && wholes.is_empty() {
             break;
         }
         // Once more, in surroundings by what was found of the others.
@@ -270,20 +270,27 @@ fn find_wholes(
     joints: &mut [Joint],
     chosen: &mut Vec<Option<Chosen>>,
 ) -> (Vec<Found>, Vec<Whole>) {
-    let (mut real, mut found) = (model.clone(), Vec::<Found>::new());
+    let (mut real, mut found, mut taken) = (model.clone(), Vec::<Found>::new(), Vec::new());
+    let mut moved = moved.to_vec();
     loop {
-        let taken: Vec<Whole> = found.iter().map(|found| found.whole).collect();
-        let looked = excerpt::with_arm(joints, moved, |joints, moved| look(&real, moved, joints, chosen, &taken));
+        let looked = excerpt::with_arm(joints, &moved, |joints, moved| look(&real, moved, joints, chosen, &taken));
         let Some(next) = looked.found else { return (found, looked.ties) };
-        let Some(there) = with(&real, std::slice::from_ref(&next)) else { return (found, looked.ties) };
         let before = laws_of(chosen);
+        let is_zero = matches!(next.whole, Whole::Offset(_));
+        let there = if is_zero { Some(real.clone()) } else { with(&real, std::slice::from_ref(&next)) };
+        let Some(there) = there else { return (found, looked.ties) };
         if !is_missed(joints, (&there, &next.laws), (&real, &before)) {
             return (found, looked.ties);
         }
         real = there;
-        surround(joints, &real, moved);
+        taken.push(next.whole);
+        match next.whole {
+            // The joint has it as its own, and the others have it in how they hang.
+            Whole::Offset(j) => moved.iter_mut().for_each(|motion| motion.put_zero_off(j, next.values[0])),
+            _ => found.push(next),
+        }
+        surround(joints, &real, &moved);
         *chosen = choose_all(joints, Bar::Noise);
-        found.push(next);
     }
 }
 

@@ -37,7 +37,7 @@ pub fn look(
     without: &[Whole],
 ) -> Outcome {
     let beside = accounts(chosen);
-    let instead = without_load(chosen, joints);
+    let instead = without_load(chosen, joints, without);
     // Behind a zero that is off all links hang elsewhere.
     let mut turned = motions.to_vec();
     for (j, own) in beside.iter().enumerate() {
@@ -52,7 +52,7 @@ pub fn look(
     // What more rounds of the same account take away speaks for no effect.
     let fits = fit_all(joints, &beside, STEPS * LOCAL);
     let mut outcome = Outcome { found: None, ties: Vec::new() };
-    for whole in Whole::ALL.into_iter().filter(|whole| !without.contains(whole)) {
+    for whole in candidates(chosen).into_iter().filter(|whole| !without.contains(whole)) {
         let Some(search) = Search::new(&[whole], model, &turned, &fits, true) else { continue };
         let none = vec![0.0; whole.numbers()];
         put(joints, &plain);
@@ -65,7 +65,10 @@ pub fn look(
             let saved: f64 = (0..joints.len()).filter_map(of).sum();
             tried.push((nats(joints, &fits, &settled.fits) - price + saved, settled, saved));
         };
-        if search.promise(joints, &fits) > 0.5 * price
+        // A zero is what the joint has of its own, until it stands in the place of what others have.
+        let is_own = matches!(whole, Whole::Offset(_));
+        if !is_own
+            && search.promise(joints, &fits) > 0.5 * price
             && let Some(settled) = search.settle(joints, &beside, &none)
         {
             hold(joints, settled, &beside);
@@ -84,7 +87,8 @@ pub fn look(
             let settled = upright.settle(joints, &accounts, &alone.values).unwrap_or(alone);
             let has_constant = |free: &[Param]| free.iter().any(|param| matches!(param, Param::Bias | Param::Offset));
             let (total, other) = (sum(&fits), sum(&settled.fits));
-            if other.sqrt() <= (1.0 + TIE) * total.sqrt()
+            if !is_own
+                && other.sqrt() <= (1.0 + TIE) * total.sqrt()
                 && !accounts.iter().flatten().any(|own| has_constant(&own.free))
             {
                 outcome.ties.push(whole);
@@ -132,7 +136,12 @@ pub fn refine(
     chosen: &[Option<Chosen>],
     found: &[Found],
 ) -> Option<Vec<Found>> {
-    let [mut beside, mut alone] = [accounts(chosen), bare(chosen, joints)];
+    let mut tried = vec![accounts(chosen), bare(chosen, joints)];
+    // What a body's lever is short of stands as rotors: they are looked at without.
+    let has_rotor = |own: &Option<Chosen>| own.iter().flat_map(|own| &own.kinds).any(|own| own.0 == Kind::Armature);
+    if found.iter().any(|own| own.whole == Whole::Payload) && chosen.iter().any(has_rotor) {
+        tried.push(without(chosen, joints, |_, kind| kind == Kind::Armature));
+    }
     let offset = |(j, own): (usize, &Option<Chosen>)| {
         let fit =
             own.as_ref().filter(|own| own.kinds.iter().any(|(kind, _)| *kind == Kind::Offset)).map(|own| &own.fit)?;
@@ -145,7 +154,7 @@ pub fn refine(
     for own in &kept {
         let Whole::Offset(joint) = own.whole else { continue };
         motions.iter_mut().for_each(|motion| motion.put_zero_off(joint, 0.0));
-        for account in [&mut beside, &mut alone].into_iter().filter_map(|accounts| accounts[joint].as_mut()) {
+        for account in tried.iter_mut().filter_map(|accounts| accounts[joint].as_mut()) {
             account.put_zero_off(0.0);
         }
     }
@@ -159,7 +168,7 @@ pub fn refine(
         let mut settle = |accounts: &[Option<Account>]| {
             search.settle(joints, accounts, &values).filter(|settled| search.is_possible(&settled.values))
         };
-        let settled: Vec<Settled> = [&beside, &alone].into_iter().filter_map(|accounts| settle(accounts)).collect();
+        let settled: Vec<Settled> = tried.iter().filter_map(|accounts| settle(accounts)).collect();
         put(joints, &search.plain);
         let samples = settled.first().map(|settled| worth(joints, &settled.fits))?;
         let price = |fits: &[Option<Fit>]| -> f64 {
@@ -211,12 +220,24 @@ fn needless(
 
 /// Accounts of the joints without any kind.
 fn bare(chosen: &[Option<Chosen>], joints: &[Joint]) -> Vec<Option<Account>> {
-    without(chosen, joints, |_| true)
+    without(chosen, joints, |_, _| true)
 }
 
-/// Accounts of the joints without what a body or a tilted base looks like to one joint.
-fn without_load(chosen: &[Option<Chosen>], joints: &[Joint]) -> Vec<Option<Account>> {
-    without(chosen, joints, is_called_up)
+/// Effects of the whole arm that may be behind what its joints have: a zero too, where joints behind it have something of its kind.
+fn candidates(chosen: &[Option<Chosen>]) -> Vec<Whole> {
+    let hangs = |own: &Option<Chosen>| {
+        own.iter().flat_map(|own| &own.kinds).any(|(kind, _)| matches!(kind, Kind::Bias | Kind::Offset))
+    };
+    let last = chosen.iter().rposition(hangs).unwrap_or(0);
+    let zeros = (0..last).filter(|&j| hangs(&chosen[j])).map(Whole::Offset);
+    Whole::ALL.into_iter().chain(zeros).collect()
+}
+
+/// Accounts of the joints without what a body, a tilted base or a zero looks like to one joint, but for zeros that stand.
+fn without_load(chosen: &[Option<Chosen>], joints: &[Joint], found: &[Whole]) -> Vec<Option<Account>> {
+    without(chosen, joints, |j, kind| {
+        is_called_up(kind) && !(kind == Kind::Offset && found.contains(&Whole::Offset(j)))
+    })
 }
 
 /// Whether an effect of the whole arm calls a kind up at a joint: what looks like load, and springs, which take over what is jolted.
@@ -225,19 +246,19 @@ fn is_called_up(kind: Kind) -> bool {
 }
 
 /// Accounts of the joints without the kinds that go.
-fn without(chosen: &[Option<Chosen>], joints: &[Joint], goes: impl Fn(Kind) -> bool) -> Vec<Option<Account>> {
-    let one = |(own, joint): (&Option<Chosen>, &Joint)| {
+fn without(chosen: &[Option<Chosen>], joints: &[Joint], goes: impl Fn(usize, Kind) -> bool) -> Vec<Option<Account>> {
+    let one = |(j, (own, joint)): (usize, (&Option<Chosen>, &Joint))| {
         let own = own.as_ref()?;
         let mut account = Account { law: own.fit.law, free: own.fit.free.clone() };
-        let stay: Vec<Kind> = own.kinds.iter().map(|own| own.0).filter(|kind| !goes(*kind)).collect();
-        for kind in own.kinds.iter().map(|own| own.0).filter(|kind| goes(*kind)) {
+        let stay: Vec<Kind> = own.kinds.iter().map(|own| own.0).filter(|kind| !goes(j, *kind)).collect();
+        for kind in own.kinds.iter().map(|own| own.0).filter(|kind| goes(j, *kind)) {
             kind.clear(&mut account.law, &joint.start, &stay);
             let stays = |param: &Param| stay.iter().any(|kind| kind.parameters().iter().any(|own| own.0 == *param));
             account.free.retain(|param| stays(param) || !kind.parameters().iter().any(|(own, _, _)| own == param));
         }
         Some(account)
     };
-    chosen.iter().zip(joints).map(one).collect()
+    chosen.iter().zip(joints).enumerate().map(one).collect()
 }
 
 /// Accounts of the joints as they are surrounded now, from fits without what looks like load on: with what is missed of it.

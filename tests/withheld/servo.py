@@ -188,6 +188,21 @@ class Motion:
         return np.array(columns).T
 
 
+def most_at_speed(model, data, dof, v, gained, last_force, drive, j):
+    """Greatest torque with which a drive comes up to its speed limit and not beyond it; its own damping at the least.
+
+    Judged by whole steps, a drive would be half its limit beyond it where it drives hard: what else accelerates the joint is
+    taken to be what it was in the step before.
+    """
+    full = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    yields = np.linalg.inv(full)[dof, dof]
+    sign, limit, damping = np.sign(v), drive["speed_limit"][j], drive["damping"][j]
+    rest = sign * (gained / STEP - yields * (last_force - damping * v))
+    most = damping * limit + ((limit - abs(v)) / STEP - rest) / yields
+    return max(most, damping * abs(v))
+
+
 def simulate(links, drive, hidden, clock, motion, times, torques=False):
     """Positions at the samples as the encoders show them before rounding, [sample, joint]."""
     n = len(links)
@@ -207,6 +222,7 @@ def simulate(links, drive, hidden, clock, motion, times, torques=False):
     tip = model.nbody - 1
     step = -int(1.5 / STEP)
     arrived = 0
+    last_v, last_force = np.zeros(n), np.zeros(n)
     before = data.qpos[at_q] + offset
     while samples < len(times):
         t = step * STEP
@@ -217,12 +233,13 @@ def simulate(links, drive, hidden, clock, motion, times, torques=False):
         error = target - q
         error = np.where(np.abs(error) < drive["dead_band"], 0.0, error)
         force = np.clip(drive["stiffness"] * error, -drive["torque_limit"], drive["torque_limit"])
-        # A drive at its speed pushes only against its own damping.
-        fast = (np.abs(v) >= drive["speed_limit"]) & (force * v > 0)
-        held = np.where(fast, np.minimum(np.abs(force), drive["damping"] * np.abs(v)) * np.sign(force), force)
         if step >= 0 and torques:
             pushes.append(force)
-        data.ctrl[push] = held
+        for j in np.flatnonzero((force * v > 0) & (np.abs(v) > 0.5 * drive["speed_limit"])):
+            most = most_at_speed(model, data, at_v[j], v[j], v[j] - last_v[j], last_force[j], drive, j)
+            force[j] = np.sign(v[j]) * min(abs(force[j]), most)
+        last_v, last_force = v.copy(), force.copy()
+        data.ctrl[push] = force
         data.qfrc_applied[:] = 0
         data.qfrc_applied[at_v] += hidden["bias"]
         if law:

@@ -319,10 +319,77 @@ fn an_encoder_zero_that_is_off_is_told_of_its_joint_alone() {
         }
     });
     let diagnosis = diagnose(&model, &logs, &Given::default(), Vec::new(), &|_, _| {}).unwrap().diagnosis;
-    let told: Vec<(&str, &[String])> = diagnosis.effects.iter().map(|e| (e.kind.as_str(), &e.joints[..])).collect();
-    assert_eq!(told, [("joint_zero_offset", &["b".to_owned()][..])]);
+    assert_eq!(told(&diagnosis), [("joint_zero_offset", &["b".to_owned()][..])]);
     let found = of(&diagnosis, "joint_zero_offset", "offset", "b");
     assert!((found + 0.08).abs() < 0.004, "{found}");
+}
+
+/// An arm whose axes stand across, and its last along the link, with a hand behind it or none; every centre of mass lies beside
+/// its axis.
+fn with_a_wrist(hand: bool) -> Model {
+    let link = |name: &str, parent: &str, at: f64, axis: &str, [x, y, z]: [f64; 3], mass: f64| {
+        format!(
+            r#"<link name="{name}l"><inertial><origin xyz="{x} {y} {z}"/><mass value="{mass}"/><inertia ixx="1e-4" iyy="1e-4" izz="2e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{name}l"/><origin xyz="0 0 {at}"/><axis xyz="{axis}"/><limit lower="-3" upper="3" effort="5" velocity="9"/></joint>"#
+        )
+    };
+    let (across, along) = ("0 1 0", "0 0 1");
+    let links = [
+        link("a", "base", 0.0, along, [0.01, -0.003, 0.06], 0.14),
+        link("b", "al", 0.11, across, [0.01, 0.006, 0.04], 0.14),
+        link("c", "bl", 0.09, across, [0.004, 0.001, 0.04], 0.13),
+        link("d", "cl", 0.08, along, [-0.006, -0.012, 0.045], 0.08),
+        link("e", "dl", 0.09, across, [-0.004, -0.014, 0.041], 0.09),
+    ];
+    let links = if hand { &links[..] } else { &links[..4] };
+    let text = format!(r#"<robot name="wrist"><link name="base"/>{}</robot>"#, links.join("\n"));
+    Model::from_urdf(&text).unwrap().model
+}
+
+/// Each kind with its joints, strongest first.
+fn told(diagnosis: &gapscope_servo::schema::Diagnosis) -> Vec<(&str, &[String])> {
+    diagnosis.effects.iter().map(|effect| (effect.kind.as_str(), &effect.joints[..])).collect()
+}
+
+/// Each joint alone is turned as far as the zero before it is off, and a tilted base or a body would turn all of them a little.
+#[test]
+fn one_zero_stands_for_what_all_joints_behind_it_have() {
+    let model = with_a_wrist(true);
+    let stiffness = [7.6, 14.6, 4.6, 0.44, 0.64];
+    let text: String = (0..5)
+        .map(|j| {
+            format!(
+                "[joint.{}]\nstiffness = {}\ndamping = {}\n",
+                "abcde".get(j..=j).unwrap(),
+                stiffness[j],
+                0.06 * stiffness[j]
+            )
+        })
+        .collect();
+    let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+    let given = Given::from_toml(&text, &names).unwrap();
+    let logs = of_each(&model, &stiffness, |j, law| {
+        if j == 1 {
+            law[Param::Offset] = -0.2;
+        }
+    });
+    let diagnosis = diagnose(&model, &logs, &given, Vec::new(), &|_, _| {}).unwrap().diagnosis;
+    assert_eq!(told(&diagnosis), [("joint_zero_offset", &["b".to_owned()][..])]);
+    let found = of(&diagnosis, "joint_zero_offset", "offset", "b");
+    assert!((found + 0.2).abs() < 0.004, "{found}");
+}
+
+/// Before anybody looks for a body, all that joints have of their own is held against an error that the body makes.
+#[test]
+fn a_body_at_a_wrist_is_found_without_a_given_servo() {
+    let model = with_a_wrist(false);
+    let body =
+        Effect::Payload(Payload { joint: "d".into(), mass: 0.06, com: [-0.044, -0.041, 0.12], inertia: [0.0; 6] });
+    let loaded = Plant::new(&model, std::slice::from_ref(&body), 1e-3).unwrap().model().clone();
+    let logs = of_each(&loaded, &[0.7, 3.6, 3.2, 0.1], |_, _| {});
+    let diagnosis = diagnose(&model, &logs, &Given::default(), Vec::new(), &|_, _| {}).unwrap().diagnosis;
+    assert_eq!(told(&diagnosis), [("payload", &["d".to_owned()][..])]);
+    assert_eq!(diagnosis.verdict, "explained");
 }
 
 #[test]

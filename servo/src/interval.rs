@@ -13,7 +13,7 @@ use crate::simulate::errors;
 use nalgebra::DMatrix;
 
 /// Blocks into which all errors of a joint are cut.
-const BLOCKS: usize = 24;
+pub(crate) const BLOCKS: usize = 24;
 /// Half a 95 % interval over the standard deviation that blocks show: Student's t at 97.5 % with as many blocks less one, times
 /// what they do not show, as other joints' laws are taken as known. Of 66 numbers of 24 simulated arms whose kinds are right,
 /// .95 lie within it, and .76 without the second factor.
@@ -21,7 +21,7 @@ pub const REACH: f64 = 2.07 * 1.6;
 /// Variance that errors add which last, as a multiple of that of their blocks: they are the model's, and go another way in another
 /// log. Of 16 numbers that two sets of three logs of a real arm (SO-101) give, 15 differ by two joint standard errors at most, and 9 of
 /// 17 without this.
-const LASTS: f64 = 10.0;
+pub(crate) const LASTS: f64 = 10.0;
 /// A scale known to a third or worse is not known: ratios are given instead of torques.
 const KNOWN: f64 = 0.33;
 
@@ -48,7 +48,7 @@ pub struct Spread {
 
 /// Changes of the errors where the loop's stiffness and where its damping answers by [`LOOP`] later: q(t − τ) is q − τ q̇, and
 /// q̇(t − τ) is q̇ − τ q̈. A simulator may take one at the beginning of a step and the other at its end.
-fn late(fit: &Fit, joint: &Joint) -> [Vec<f64>; 2] {
+pub(crate) fn late(fit: &Fit, joint: &Joint) -> [Vec<f64>; 2] {
     let [mut stiffness, mut damping] = [fit.law; 2];
     stiffness[Param::Damping] -= LOOP * stiffness[Param::Feedback];
     damping[Param::Armature] -= LOOP * damping[Param::Damping];

@@ -45,12 +45,24 @@ pub fn look(
         turned.iter_mut().for_each(|motion| motion.put_zero_off(j, offset));
     }
     let plain = around(model, &turned);
-    let count = |account: &Option<Account>| account.as_ref().map_or(0, |a| a.free.len());
-    let fewer = |j: usize, than: &[Option<Account>]| count(&beside[j]) as f64 - count(&than[j]) as f64;
     put(joints, &plain);
     let perfect: Vec<f64> = joints.iter().map(tracking).collect();
     // What more rounds of the same account take away speaks for no effect.
     let fits = fit_all(joints, &beside, STEPS * LOCAL);
+    let calls_up = saved(joints, &beside, &instead, &fits) > 0.0;
+    let mut poor = (beside.clone(), fits.clone());
+    if calls_up {
+        // Nor does what they do better without what was called up by an effect that is found by now.
+        put(joints, &around(model, motions));
+        let alone = fit_all(joints, &instead, STEPS * LOCAL);
+        let accounts = restored(joints, chosen, &alone);
+        let fits = fit_all(joints, &accounts, STEPS * LOCAL);
+        if nats(joints, &poor.1, &fits) + saved(joints, &beside, &accounts, &fits) > 0.0 {
+            poor = (accounts, fits);
+        }
+        put(joints, &plain);
+    }
+    let (had, poor) = poor;
     let mut outcome = Outcome { found: None, ties: Vec::new() };
     for whole in candidates(chosen).into_iter().filter(|whole| !without.contains(whole)) {
         let Some(search) = Search::new(&[whole], model, &turned, &fits, true) else { continue };
@@ -59,11 +71,8 @@ pub fn look(
         let price = whole.price(worth(joints, &fits).iter().sum());
         let mut tried: Vec<(f64, Settled, f64)> = Vec::new();
         let mut hold = |joints: &[Joint], settled: Settled, accounts: &[Option<Account>]| {
-            let of = |j: usize| {
-                Some(0.5 * fewer(j, accounts) * independent(&joints[j], &settled.fits[j].as_ref()?.errors).ln())
-            };
-            let saved: f64 = (0..joints.len()).filter_map(of).sum();
-            tried.push((nats(joints, &fits, &settled.fits) - price + saved, settled, saved));
+            let saved = saved(joints, &had, accounts, &settled.fits);
+            tried.push((nats(joints, &poor, &settled.fits) - price + saved, settled, saved));
         };
         // A zero is what the joint has of its own, until it stands in the place of what others have.
         let is_own = matches!(whole, Whole::Offset(_));
@@ -74,7 +83,6 @@ pub fn look(
             hold(joints, settled, &beside);
         }
         // What it called up at the joints may be all that they have of the kind; what is missed beside it comes back.
-        let calls_up = (0..joints.len()).any(|j| fewer(j, &instead) > 0.0);
         let is_turned = calls_up && turned != motions;
         let upright = is_turned.then(|| Search::new(&[whole], model, motions, &fits, true)).flatten();
         let upright = upright.as_ref().unwrap_or(&search);
@@ -86,7 +94,7 @@ pub fn look(
             let accounts = restored(joints, chosen, &alone.fits);
             let settled = upright.settle(joints, &accounts, &alone.values).unwrap_or(alone);
             let has_constant = |free: &[Param]| free.iter().any(|param| matches!(param, Param::Bias | Param::Offset));
-            let (total, other) = (sum(&fits), sum(&settled.fits));
+            let (total, other) = (sum(&poor), sum(&settled.fits));
             if !is_own
                 && other.sqrt() <= (1.0 + TIE) * total.sqrt()
                 && !accounts.iter().flatten().any(|own| has_constant(&own.free))
@@ -98,7 +106,7 @@ pub fn look(
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
         let Some((nats, settled, saved)) = tried.into_iter().next() else { continue };
         let falls = |j: usize| {
-            let (rich, poor) = (settled.fits[j].as_ref()?, fits[j].as_ref()?);
+            let (rich, poor) = (settled.fits[j].as_ref()?, poor[j].as_ref()?);
             let (fall, least) = (poor.cost - rich.cost, least(rich.cost, perfect[j]));
             Some((fall / poor.cost.max(1e-300), fall > least, fall / lasting(&joints[j], &rich.errors).max(1e-300)))
         };
@@ -162,35 +170,64 @@ pub fn refine(
         if kept.is_empty() {
             return Some(kept);
         }
-        let wholes: Vec<Whole> = kept.iter().map(|own| own.whole).collect();
-        let values: Vec<f64> = kept.iter().flat_map(|own| own.values.iter().copied()).collect();
-        let search = Search::new(&wholes, model, &motions, &vec![None; joints.len()], false)?;
-        let mut settle = |accounts: &[Option<Account>]| {
-            search.settle(joints, accounts, &values).filter(|settled| search.is_possible(&settled.values))
-        };
-        let settled: Vec<Settled> = tried.iter().filter_map(|accounts| settle(accounts)).collect();
-        put(joints, &search.plain);
-        let samples = settled.first().map(|settled| worth(joints, &settled.fits))?;
-        let price = |fits: &[Option<Fit>]| -> f64 {
-            let of = |(fit, samples): (&Option<Fit>, &f64)| {
-                fit.as_ref().map_or(0.0, |fit| 0.5 * fit.free.len() as f64 * samples.max(2.0).ln())
-            };
-            fits.iter().zip(&samples).map(of).sum()
-        };
-        let score = |settled: &Settled| misfit(&settled.fits, &samples) + price(&settled.fits);
-        let settled = settled.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
-        let covariance = search.covariance(&settled);
+        let search = search_of(&kept, model, &motions, joints.len())?;
+        let settled = settle_best(&search, &kept, joints, &tried, None)?;
+        let samples = worth(joints, &settled.fits);
         let places = search.places();
-        let needless = needless(&places, &settled, &covariance, samples.iter().sum());
+        let spread = search.spread(joints, &settled)?;
+        put(joints, &search.plain);
+        let mut needless = needless(&places, &settled, &spread, samples.iter().sum());
         for (own, (_, numbers)) in kept.iter_mut().zip(&places) {
             own.values = settled.values[numbers.clone()].to_vec();
-            own.covariance = covariance.view((numbers.start, numbers.start), (numbers.len(), numbers.len())).into();
+            own.covariance = spread.view((numbers.start, numbers.start), (numbers.len(), numbers.len())).into();
+        }
+        // Off nothing by far may lie what leads to a poorer account than there is without it.
+        let bodies = kept.iter().filter(|own| needless.is_empty() && !matches!(own.whole, Whole::Offset(_)));
+        for whole in bodies.map(|own| own.whole).collect::<Vec<_>>() {
+            let rest: Vec<Found> = kept.iter().filter(|own| own.whole != whole).cloned().collect();
+            let without = search_of(&rest, model, &motions, joints.len())?;
+            let poor = settle_best(&without, &rest, joints, &tried, Some(&samples));
+            put(joints, &search.plain);
+            let lost = poor.map_or(f64::INFINITY, |poor| score(&poor.fits, &samples) - score(&settled.fits, &samples));
+            if lost < whole.price(samples.iter().sum()) + TAKEN {
+                needless.push(whole);
+            }
         }
         if needless.is_empty() {
             return Some(kept);
         }
         kept.retain(|own| !needless.contains(&own.whole));
     }
+}
+
+/// A search for the numbers of effects all at once.
+fn search_of<'a>(kept: &[Found], model: &'a Model, motions: &'a [Motion], joints: usize) -> Option<Search<'a>> {
+    let wholes: Vec<Whole> = kept.iter().map(|own| own.whole).collect();
+    Search::new(&wholes, model, motions, &vec![None; joints], false)
+}
+
+/// What a search settles at beside the accounts, of those tried, that leave least.
+fn settle_best(
+    search: &Search,
+    kept: &[Found],
+    joints: &mut [Joint],
+    tried: &[Vec<Option<Account>>],
+    samples: Option<&[f64]>,
+) -> Option<Settled> {
+    let values: Vec<f64> = kept.iter().flat_map(|own| own.values.iter().copied()).collect();
+    let settled = tried.iter().filter_map(|accounts| search.settle(joints, accounts, &values));
+    let settled: Vec<Settled> = settled.filter(|settled| search.is_possible(&settled.values)).collect();
+    let own = settled.first().map(|settled| worth(joints, &settled.fits))?;
+    let samples = samples.unwrap_or(&own);
+    settled.into_iter().min_by(|a, b| score(&a.fits, samples).total_cmp(&score(&b.fits, samples)))
+}
+
+/// Nats of misfit of fits, and what their parameters cost.
+fn score(fits: &[Option<Fit>], samples: &[f64]) -> f64 {
+    let price = |(fit, samples): (&Option<Fit>, &f64)| {
+        fit.as_ref().map_or(0.0, |fit| 0.5 * fit.free.len() as f64 * samples.max(2.0).ln())
+    };
+    misfit(fits, samples) + fits.iter().zip(samples).map(price).sum::<f64>()
 }
 
 /// Effects that the logs do not miss: the weakest beside the others, then the weakest beside those that are left, while what is lost
@@ -275,6 +312,16 @@ fn restored(joints: &mut [Joint], chosen: &[Option<Chosen>], fits: &[Option<Fit>
 fn accounts(chosen: &[Option<Chosen>]) -> Vec<Option<Account>> {
     let of = |own: &Chosen| Account { law: own.fit.law, free: own.fit.free.clone() };
     chosen.iter().map(|own| own.as_ref().map(of)).collect()
+}
+
+/// Nats that accounts save by the parameters that they have less than others, by what their own fits are worth.
+fn saved(joints: &[Joint], than: &[Option<Account>], accounts: &[Option<Account>], fits: &[Option<Fit>]) -> f64 {
+    let count = |account: &Option<Account>| account.as_ref().map_or(0.0, |account| account.free.len() as f64);
+    let of = |(j, fit): (usize, &Option<Fit>)| {
+        let fewer = count(&than[j]) - count(&accounts[j]);
+        Some(0.5 * fewer * independent(&joints[j], &fit.as_ref()?.errors).ln())
+    };
+    fits.iter().enumerate().filter_map(of).sum()
 }
 
 /// Nats by which richer fits are ahead of poorer ones, before what they cost.

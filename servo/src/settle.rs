@@ -6,8 +6,10 @@
 use crate::around::Motion;
 use crate::choice::Projector;
 use crate::fit::{Fit, fit};
+use crate::interval::{self, BLOCKS, LASTS};
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
+use crate::rest::lasting;
 use crate::simulate::errors;
 use crate::weigh::independent;
 use crate::whole::{Around, Whole, around, ball, changed, put, shifted};
@@ -184,18 +186,10 @@ impl<'a> Search<'a> {
         self.places().into_iter().all(|(whole, numbers)| !whole.at_bound(self.model, &values[numbers]))
     }
 
-    /// N and g at fits of the joints as they are surrounded now, by `base`; each joint is worth so many `samples`. A joint counts by
-    /// the least error that any account of it came to: by one that misses much it would count for nothing.
-    fn equations(
-        &self,
-        joints: &mut [Joint],
-        fits: &[Option<Fit>],
-        values: &[f64],
-        base: &Around,
-        samples: &[f64],
-    ) -> Equations {
-        let p = self.probes.len();
-        let mut moved: Vec<Vec<Vec<f64>>> = Vec::with_capacity(p);
+    /// Changes of the errors by each number, `[number][joint]`, at fits of the joints as they are surrounded now, by `base`; what the
+    /// joints' own parameters can do is taken out.
+    fn columns(&self, joints: &mut [Joint], fits: &[Option<Fit>], values: &[f64], base: &Around) -> Vec<Vec<Vec<f64>>> {
+        let mut moved: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.probes.len());
         let own: Vec<Whole> = self.places().into_iter().flat_map(|(whole, at)| vec![whole; at.len()]).collect();
         let turns = self.turns();
         for (i, (probe, whole)) in self.probes.iter().zip(own).enumerate() {
@@ -224,27 +218,45 @@ impl<'a> Search<'a> {
                     }
                     let mut out = Vec::new();
                     errors(&law, &joint.runs, &mut out);
-                    out.iter().zip(&fit.errors).map(|(there, here)| (there - here) / probe).collect()
+                    let change = out.iter().zip(&fit.errors).map(|(there, here)| (there - here) / probe).collect();
+                    Projector::new(&fit.sensitivity).clear(change)
                 })
                 .collect();
             moved.push(columns);
         }
         put(joints, base);
+        moved
+    }
+
+    /// What a joint counts for that is worth so many `samples`: by the least error that any account of it came to. By one that
+    /// misses much it would count for nothing.
+    fn weight(&self, j: usize, fit: &Fit, samples: f64) -> f64 {
+        samples / fit.cost.min(self.least[j]).max(1e-300)
+    }
+
+    /// N and g at fits of the joints as they are surrounded now, by `base`; each joint is worth so many `samples`.
+    fn equations(
+        &self,
+        joints: &mut [Joint],
+        fits: &[Option<Fit>],
+        values: &[f64],
+        base: &Around,
+        samples: &[f64],
+    ) -> Equations {
+        let p = self.probes.len();
+        let columns = self.columns(joints, fits, values, base);
         let (mut normal, mut gradient) = (DMatrix::zeros(p, p), DVector::zeros(p));
         for (j, fit) in fits.iter().enumerate() {
             let Some(fit) = fit else { continue };
-            let weight = samples[j] / fit.cost.min(self.least[j]).max(1e-300);
-            let project = Projector::new(&fit.sensitivity);
-            let columns: Vec<Vec<f64>> = moved.iter().map(|columns| project.clear(columns[j].clone())).collect();
-            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let weight = self.weight(j, fit, samples[j]);
             for a in 0..p {
-                gradient[a] += weight * dot(&columns[a], &fit.errors);
+                gradient[a] += weight * dot(&columns[a][j], &fit.errors);
                 for b in 0..p {
-                    normal[(a, b)] += weight * dot(&columns[a], &columns[b]);
+                    normal[(a, b)] += weight * dot(&columns[a][j], &columns[b][j]);
                 }
             }
         }
-        for (mass, own) in turns {
+        for (mass, own) in self.turns() {
             let usual = ball(values[mass]).max(ball(self.probes[mass]));
             normal[(own, own)] += 1.0 / (usual * usual);
             gradient[own] += (values[own] - ball(values[mass])) / (usual * usual);
@@ -274,6 +286,37 @@ impl<'a> Search<'a> {
         inverse.unwrap_or_else(|| DMatrix::from_diagonal_element(numbers, numbers, 1e6))
     }
 
+    /// Covariance of the numbers by what the data show, as that of a joint's parameters: errors are coloured, what lasts of them is
+    /// another in another log, and all loops may answer late. Leaves the joints in the surroundings of the settled arm.
+    pub(crate) fn spread(&self, joints: &mut [Joint], settled: &Settled) -> Option<DMatrix<f64>> {
+        let p = self.probes.len();
+        let base = self.around(&settled.values)?;
+        put(joints, &base);
+        let samples = worth(joints, &settled.fits);
+        let columns = self.columns(joints, &settled.fits, &settled.values, &base);
+        // What is known beforehand scatters as it says.
+        let mut scatter = self.damped(&settled.equations, DAMPING) - &settled.equations.normal;
+        let mut late = [DVector::zeros(p), DVector::zeros(p)];
+        for (j, fit) in settled.fits.iter().enumerate() {
+            let Some(fit) = fit else { continue };
+            let weight = self.weight(j, fit, samples[j]);
+            let pull = |errors: &[f64], from: usize| {
+                let of = |number: &Vec<Vec<f64>>| weight * dot(&number[j][from..from + errors.len()], errors);
+                DVector::from_iterator(p, columns.iter().map(of))
+            };
+            let lasts = 1.0 + LASTS * lasting(&joints[j], &fit.errors) / fit.cost.max(1e-300);
+            let length = fit.errors.len().div_ceil(BLOCKS).max(1);
+            for (k, errors) in fit.errors.chunks(length).enumerate() {
+                let pull = pull(errors, k * length);
+                scatter += lasts * &pull * pull.transpose();
+            }
+            late.iter_mut().zip(interval::late(fit, &joints[j])).for_each(|(late, moved)| *late += pull(&moved, 0));
+        }
+        late.iter().for_each(|late| scatter += late * late.transpose());
+        let inverse = self.covariance(settled);
+        Some(&inverse * scatter * &inverse)
+    }
+
     /// −(N + λ D)⁻¹ g.
     fn step(&self, equations: &Equations, damping: f64) -> Option<DVector<f64>> {
         self.damped(equations, damping)
@@ -300,6 +343,11 @@ impl<'a> Search<'a> {
         let equations = self.equations(joints, &fits, from, &base, &samples);
         let mut best = Settled { values: from.to_vec(), fits, equations, steps: 0 };
         let (mut damping, mut refused) = (DAMPING, 0);
+        // Without a number there is nothing to step on, and the joints alone go as far.
+        if self.probes.is_empty() {
+            best.fits = fit_all(joints, &accounts, STEPS * LOCAL);
+            return Some(best);
+        }
         while best.steps < STEPS && refused < REFUSED {
             let step = self.step(&best.equations, damping)?;
             let values = self.clamped(&(DVector::from_column_slice(&best.values) + step));
@@ -333,6 +381,10 @@ impl<'a> Search<'a> {
         };
         fits.iter().zip(samples).zip(&self.least).map(of).sum()
     }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// A fit of each joint's account, by so many rounds at most.

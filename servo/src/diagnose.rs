@@ -16,9 +16,10 @@ use crate::given::Given;
 use crate::interval::Spread;
 use crate::kinds::Kind;
 use crate::law::{Law, Param};
-use crate::look::{look, refine};
+use crate::look::look;
 use crate::model::{ServoModel, ServoModelError};
 use crate::prepare::{Joint, joints};
+use crate::refine::refine;
 use crate::rest;
 use crate::schema::*;
 use crate::simulate::trace;
@@ -276,8 +277,7 @@ fn find_wholes(
         let looked = excerpt::with_arm(joints, &moved, |joints, moved| look(&real, moved, joints, chosen, &taken));
         let Some(next) = looked.found else { return (found, looked.ties) };
         let before = laws_of(chosen);
-        let is_zero = matches!(next.whole, Whole::Offset(_));
-        let there = if is_zero { Some(real.clone()) } else { with(&real, std::slice::from_ref(&next)) };
+        let there = if next.whole.is_zero() { Some(real.clone()) } else { with(&real, std::slice::from_ref(&next)) };
         let Some(there) = there else { return (found, looked.ties) };
         if !is_missed(joints, (&there, &next.laws), (&real, &before)) {
             return (found, looked.ties);
@@ -314,7 +314,7 @@ fn settle(
             own.put_zero_off(zero_of(j));
             moved.iter_mut().for_each(|motion| motion.put_zero_off(j, own.fit.law[Param::Offset]));
         }
-        let kept: Vec<Found> = refined.into_iter().filter(|own| !matches!(own.whole, Whole::Offset(_))).collect();
+        let kept: Vec<Found> = refined.into_iter().filter(|own| !own.whole.is_zero()).collect();
         if let Some(there) = with(model, &kept) {
             (*wholes, real) = (kept, there);
         }

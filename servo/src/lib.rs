@@ -4,6 +4,7 @@
 //! and how far for the whole arm; a [`ServoModel`] is what it leaves for other logs.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod account;
 mod arm;
 mod around;
 mod choice;
@@ -27,6 +28,7 @@ mod look;
 mod model;
 mod needless;
 mod prepare;
+mod refine;
 mod rest;
 mod run;
 pub mod schema;

@@ -3,6 +3,7 @@
 //! Given an arm's surroundings, joints are fitted apart; what ties them is θ. Gauss–Newton on θ, with what each joint's own
 //! parameters can do taken out of both sides: N = Σ w T̃ᵀT̃, g = Σ w T̃ᵀe, weights w of each joint by its own error.
 
+use crate::account::Account;
 use crate::around::Motion;
 use crate::choice::Projector;
 use crate::fit::{Fit, fit};
@@ -29,21 +30,6 @@ const DAMPING: f64 = 0.01;
 const MORE: f64 = 30.0;
 /// Nats that a step must gain: less is told by no log.
 const GAIN: f64 = 0.5;
-
-/// A joint's account: its law and what of it is free.
-#[derive(Clone)]
-pub(crate) struct Account {
-    pub(crate) law: Law,
-    pub(crate) free: Vec<Param>,
-}
-
-impl Account {
-    /// Its encoder's zero is what the whole arm says.
-    pub(crate) fn put_zero_off(&mut self, offset: f64) {
-        self.free.retain(|param| *param != Param::Offset);
-        self.law[Param::Offset] = offset;
-    }
-}
 
 /// A search under way: effects of the whole arm beside the accounts of all joints.
 pub(crate) struct Search<'a> {

@@ -136,6 +136,11 @@ impl Whole {
         [first].iter().chain(&values[1..]).zip(bounds).map(|(value, [least, most])| value.clamp(least, most)).collect()
     }
 
+    /// Whether it is the zero of a joint's encoder, which that joint has as its own.
+    pub(crate) fn is_zero(self) -> bool {
+        matches!(self, Whole::Offset(_))
+    }
+
     /// Whether the logs tell what makes it what it is: a body has a mass, as a moment alone is what a bias or a zero is to one joint.
     pub(crate) fn is_told(self, values: &[f64], covariance: &DMatrix<f64>) -> bool {
         self != Whole::Payload || 0.5 * values[0].powi(2) / covariance[(0, 0)].max(1e-300) >= TAKEN

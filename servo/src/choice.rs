@@ -69,14 +69,19 @@ impl<'a> Projector<'a> {
         Projector { sensitivity, inverse }
     }
 
-    pub(crate) fn clear(&self, mut change: Vec<f64>) -> Vec<f64> {
-        let Some(inverse) = &self.inverse else { return change };
+    pub(crate) fn clear(&self, change: Vec<f64>) -> Vec<f64> {
+        self.split(change).0
+    }
+
+    /// What is left of a change, and by how much each free parameter would make up the rest of it.
+    pub(crate) fn split(&self, mut change: Vec<f64>) -> (Vec<f64>, Vec<f64>) {
+        let Some(inverse) = &self.inverse else { return (change, vec![0.0; self.sensitivity.len()]) };
         let (_, along) = normal(self.sensitivity, &change);
         let parts = inverse * along;
         for (part, column) in parts.iter().zip(self.sensitivity) {
             change.iter_mut().zip(column).for_each(|(c, s)| *c -= part * s);
         }
-        change
+        (change, parts.iter().copied().collect())
     }
 }
 

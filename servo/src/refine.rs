@@ -24,10 +24,13 @@ pub fn refine(
     chosen: &[Option<Chosen>],
     found: &[Found],
 ) -> Option<Vec<Found>> {
-    let mut tried = vec![accounts(chosen), without(chosen, joints, |_, _| true)];
+    let has = |goes: &dyn Fn(Kind) -> bool| chosen.iter().flatten().flat_map(|own| &own.kinds).any(|own| goes(own.0));
+    let mut tried = vec![accounts(chosen)];
+    if has(&|_| true) {
+        tried.push(without(chosen, joints, |_, _| true));
+    }
     // What a body's lever is short of stands as rotors: they are looked at without.
-    let has_rotor = |own: &Option<Chosen>| own.iter().flat_map(|own| &own.kinds).any(|own| own.0 == Kind::Armature);
-    if found.iter().any(|own| own.whole == Whole::Payload) && chosen.iter().any(has_rotor) {
+    if found.iter().any(|own| own.whole == Whole::Payload) && has(&|kind| kind == Kind::Armature) {
         tried.push(without(chosen, joints, |_, kind| kind == Kind::Armature));
     }
     let mut kept: Vec<Found> = found.iter().cloned().chain(chosen.iter().enumerate().filter_map(zero)).collect();

@@ -28,6 +28,9 @@ pub(crate) const LOCAL: usize = 2;
 /// that leads up.
 const DAMPING: f64 = 0.01;
 const MORE: f64 = 30.0;
+/// Part of a probe by which a number is moved where it is there already: what joints can make up for of it leaves little, and that
+/// must not be what the probe itself bends.
+const NEAR: f64 = 0.02;
 /// Nats that a step must gain: less is told by no log.
 const GAIN: f64 = 0.5;
 
@@ -61,6 +64,8 @@ pub(crate) struct Settled {
 pub(crate) struct Equations {
     normal: DMatrix<f64>,
     gradient: DVector<f64>,
+    /// By how much each free parameter of a joint makes up for a number, `[number][joint][free]`.
+    answers: Vec<Vec<Vec<f64>>>,
 }
 
 impl Settled {
@@ -172,32 +177,41 @@ impl<'a> Search<'a> {
         self.places().into_iter().all(|(whole, numbers)| !whole.at_bound(self.model, &values[numbers]))
     }
 
-    /// Changes of the errors by each number, `[number][joint]`, at fits of the joints as they are surrounded now, by `base`; what the
-    /// joints' own parameters can do is taken out.
-    fn columns(&self, joints: &mut [Joint], fits: &[Option<Fit>], values: &[f64], base: &Around) -> Vec<Vec<Vec<f64>>> {
-        let mut moved: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.probes.len());
+    /// Changes of the errors by each number, `[number][joint]`, at fits of the joints as they are surrounded now, by `base`: what the
+    /// joints' own parameters cannot make up for, and by how much of each they make up for the rest.
+    fn columns(
+        &self,
+        joints: &mut [Joint],
+        fits: &[Option<Fit>],
+        values: &[f64],
+        base: &Around,
+    ) -> Vec<Vec<(Vec<f64>, Vec<f64>)>> {
+        let mut moved = Vec::with_capacity(self.probes.len());
         let own: Vec<Whole> = self.places().into_iter().flat_map(|(whole, at)| vec![whole; at.len()]).collect();
         let turns = self.turns();
         for (i, (probe, whole)) in self.probes.iter().zip(own).enumerate() {
             if self.is_ball && turns.iter().any(|(_, own)| *own == i) {
-                moved.push(
-                    fits.iter().map(|fit| fit.as_ref().map_or(Vec::new(), |fit| vec![0.0; fit.errors.len()])).collect(),
-                );
+                let nothing = |fit: &Option<Fit>| {
+                    fit.as_ref()
+                        .map_or_else(Default::default, |fit| (vec![0.0; fit.errors.len()], vec![0.0; fit.free.len()]))
+                };
+                moved.push(fits.iter().map(nothing).collect());
                 continue;
             }
-            // What a body does goes by the square of its lever: it is seen where it is. Of the rest the change about the nominal arm is
-            // laid on the surroundings of now.
-            let is_there = whole == Whole::Payload && values.iter().any(|value| *value != 0.0);
+            // What a body does goes by the square of its lever, and what a tilt does by its sine: either is seen where it is, and so
+            // near that it goes straight on. Of the rest the change about the nominal arm is laid on the surroundings of now.
+            let is_there = !whole.is_zero() && values.iter().any(|value| *value != 0.0);
             let mut there = values.to_vec();
-            there[i] += probe;
+            there[i] += NEAR * probe;
             let seen = is_there.then(|| self.around(&there)).flatten();
+            let probe = if seen.is_some() { NEAR * probe } else { *probe };
             put(joints, &seen.unwrap_or_else(|| shifted(base, &self.plain, &self.probed[i])));
-            let columns: Vec<Vec<f64>> = joints
+            let columns: Vec<(Vec<f64>, Vec<f64>)> = joints
                 .par_iter()
                 .zip(fits)
                 .enumerate()
                 .map(|(j, (joint, fit))| {
-                    let Some(fit) = fit else { return Vec::new() };
+                    let Some(fit) = fit else { return Default::default() };
                     let mut law = fit.law;
                     if whole == Whole::Offset(j) {
                         law[Param::Offset] += probe;
@@ -205,7 +219,7 @@ impl<'a> Search<'a> {
                     let mut out = Vec::new();
                     errors(&law, &joint.runs, &mut out);
                     let change = out.iter().zip(&fit.errors).map(|(there, here)| (there - here) / probe).collect();
-                    Projector::new(&fit.sensitivity).clear(change)
+                    Projector::new(&fit.sensitivity).split(change)
                 })
                 .collect();
             moved.push(columns);
@@ -236,9 +250,9 @@ impl<'a> Search<'a> {
             let Some(fit) = fit else { continue };
             let weight = self.weight(j, fit, samples[j]);
             for a in 0..p {
-                gradient[a] += weight * dot(&columns[a][j], &fit.errors);
+                gradient[a] += weight * dot(&columns[a][j].0, &fit.errors);
                 for b in 0..p {
-                    normal[(a, b)] += weight * dot(&columns[a][j], &columns[b][j]);
+                    normal[(a, b)] += weight * dot(&columns[a][j].0, &columns[b][j].0);
                 }
             }
         }
@@ -247,7 +261,9 @@ impl<'a> Search<'a> {
             normal[(own, own)] += 1.0 / (usual * usual);
             gradient[own] += (values[own] - ball(values[mass])) / (usual * usual);
         }
-        Equations { normal, gradient }
+        let answers =
+            columns.into_iter().map(|number| number.into_iter().map(|(_, answer)| answer).collect()).collect();
+        Equations { normal, gradient, answers }
     }
 
     /// Where the mass of each body stands, and what it turns about itself.
@@ -287,7 +303,8 @@ impl<'a> Search<'a> {
             let Some(fit) = fit else { continue };
             let weight = self.weight(j, fit, samples[j]);
             let pull = |errors: &[f64], from: usize| {
-                let of = |number: &Vec<Vec<f64>>| weight * dot(&number[j][from..from + errors.len()], errors);
+                let of =
+                    |number: &Vec<(Vec<f64>, Vec<f64>)>| weight * dot(&number[j].0[from..from + errors.len()], errors);
                 DVector::from_iterator(p, columns.iter().map(of))
             };
             let lasts = 1.0 + LASTS * lasting(&joints[j], &fit.errors) / fit.cost.max(1e-300);
@@ -337,11 +354,17 @@ impl<'a> Search<'a> {
         while best.steps < STEPS && refused < REFUSED {
             let step = self.step(&best.equations, damping)?;
             let values = self.clamped(&(DVector::from_column_slice(&best.values) + step));
+            let moved: Vec<f64> = values.iter().zip(&best.values).map(|(there, here)| there - here).collect();
             let base = self.around(&values)?;
             put(joints, &base);
-            for (account, fit) in accounts.iter_mut().zip(&best.fits) {
-                if let (Some(account), Some(fit)) = (account, fit) {
-                    account.law = fit.law;
+            for (j, (account, fit)) in accounts.iter_mut().zip(&best.fits).enumerate() {
+                let (Some(account), Some(fit)) = (account, fit) else { continue };
+                account.law = fit.law;
+                // Beside other numbers the joint is another: from its old one a fit would take many rounds.
+                for (answers, moved) in best.equations.answers.iter().zip(&moved) {
+                    for (&param, answer) in fit.free.iter().zip(&answers[j]) {
+                        account.law[param] -= answer * moved;
+                    }
                 }
             }
             self.tell(&mut accounts, &values);

@@ -282,9 +282,13 @@ impl Joint {
         }
     }
 
-    /// The encoder's step, rad: the least change of position that the logs show.
+    /// The encoder's step, rad: the least change of position that the logs show. What stands for a lost reading is none of it.
     pub fn encoder_step(&self) -> f64 {
-        let changes = self.runs.iter().flat_map(|run| run.position.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
+        let of = |run: &'_ Run| -> Vec<f64> {
+            let read = |k: &usize| !run.stale[*k] && !run.stale[k - 1];
+            (1..run.position.len()).filter(read).map(|k| (run.position[k] - run.position[k - 1]).abs()).collect()
+        };
+        let changes = self.runs.iter().flat_map(of);
         let least = changes.filter(|change| *change > 1e-7).fold(f64::INFINITY, f64::min);
         // A log without a step has no noise that could be seen; a simulation is no better than this.
         if least.is_finite() { least.clamp(1e-5, 1e-2) } else { 1e-3 }

@@ -13,6 +13,8 @@ const ROUNDING: f64 = 1.5;
 /// Means of errors up to this part of perfect tracking's are noise: simulators differ by as much in how friction sticks, loops
 /// answer and limits hold.
 const MODELLED: f64 = 0.015;
+/// Longest time that errors are compared over before they are said to forget, s: a hum comes back within a second or so.
+const MEMORY: f64 = 1.5;
 /// Means of errors up to this many times what errors that forget from sample to sample leave of them are noise: clocks jitter,
 /// and samples repeat.
 const WHITE: f64 = 2.5;
@@ -21,8 +23,24 @@ fn samples_of_a_span(joint: &Joint) -> usize {
     ((SPAN / joint.dt.max(1e-4)).round() as usize).max(2)
 }
 
+/// Mean square of what errors forget: half the least mean square of their changes over any time within [`MEMORY`], and of their
+/// sums, as half a turn later a hum is its negative.
+fn forgotten(errors: &[&[f64]], dt: f64) -> f64 {
+    let most = (MEMORY / dt.max(1e-4)).round() as usize;
+    let longest = errors.iter().map(|errors| errors.len()).max().unwrap_or(0);
+    let at = |lag: usize| {
+        let pairs = || errors.iter().flat_map(|errors| errors.iter().skip(lag).zip(errors.iter()));
+        let (mut changes, mut sums, mut count) = (0.0, 0.0, 0.0);
+        pairs().for_each(|(a, b)| {
+            (changes, sums, count) = (changes + (a - b).powi(2), sums + (a + b).powi(2), count + 1.0)
+        });
+        0.5 * f64::min(changes, sums) / f64::max(count, 1.0)
+    };
+    (1..=most.min(longest / 3).max(1)).map(at).fold(f64::INFINITY, f64::min)
+}
+
 /// What is left of a joint against what noise would leave: up to one it is noise. Root mean squares of means over [`SPAN`]; the
-/// noise of a sample is told by the change of the error from one to the next. A clock that strays moves a whole answer to a step of
+/// noise of a sample is what the error forgets. A clock that strays moves a whole answer to a step of
 /// the set point: up to that, too, it is noise.
 pub fn structure(joint: &Joint, law: &Law) -> f64 {
     let rounding = joint.encoder_step() / 12f64.sqrt();
@@ -41,8 +59,7 @@ pub fn structure(joint: &Joint, law: &Law) -> f64 {
         .collect();
     let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
     let means = rms(errors.iter().flat_map(|run| run.chunks_exact(count)).map(mean));
-    // Of white noise, half of the mean square of changes is its variance.
-    let white = rms(errors.iter().flat_map(|run| run.windows(2)).map(|pair| pair[1] - pair[0])) / 2f64.sqrt();
+    let white = forgotten(&errors.iter().map(Vec::as_slice).collect::<Vec<_>>(), joint.dt).sqrt();
     let compared: f64 = joint.runs.iter().flat_map(|run| &run.weight).map(|weight| weight * weight).sum();
     let perfect = (tracking(joint) / compared.max(1e-300)).sqrt();
     let noise =
@@ -60,7 +77,7 @@ pub fn lasting(joint: &Joint, errors: &[f64]) -> f64 {
     for run in &joint.runs {
         let errors = &errors[from..from + run.time.len()];
         from += run.time.len();
-        let white = errors.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>() / (2 * errors.len()) as f64;
+        let white = forgotten(&[errors], joint.dt);
         let clock = run
             .weight
             .iter()

@@ -8,7 +8,8 @@ use crate::weigh::{speeds, tracking};
 /// Time over which errors are averaged before they are held against noise, s: noise forgets within a sample or two, what an
 /// effect leaves lasts as long as a motion does.
 const SPAN: f64 = 0.15;
-/// Means of errors up to this many standard deviations of one sample's rounding are noise: no integrator is another's to better.
+/// Means of errors up to this many standard deviations of one sample's rounding are noise to a verdict: no integrator is another's to
+/// better.
 const ROUNDING: f64 = 1.5;
 /// Means of errors up to this part of perfect tracking's are noise: simulators differ by as much in how friction sticks, loops
 /// answer and limits hold.
@@ -83,7 +84,7 @@ pub fn lasting(joint: &Joint, errors: &[f64]) -> f64 {
             .iter()
             .zip(speeds(&run.time, &run.position))
             .map(|(weight, speed)| (weight * run.strays * speed).powi(2));
-        let noise = clock.sum::<f64>() / errors.len() as f64 + (step * ROUNDING).powi(2) / 12.0;
+        let noise = clock.sum::<f64>() / errors.len() as f64 + step.powi(2) / 12.0;
         let means = errors.chunks_exact(count).map(|span| (span.iter().sum::<f64>() / count as f64).powi(2));
         lasting += means.map(|mean| count as f64 * (mean - noise - white / count as f64)).sum::<f64>();
     }

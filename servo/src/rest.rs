@@ -180,6 +180,25 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn what_stands_for_a_lost_reading_is_no_step_of_the_encoder() {
+        let mut joint = joint(vec![0.0, 3e-3, 4e-3, 6e-3, 4.5e-3]);
+        assert!((joint.encoder_step() - 1e-3).abs() < 1e-12);
+        joint.runs[0].stale[2] = true;
+        assert!((joint.encoder_step() - 1.5e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_hum_is_not_forgotten_and_noise_is() {
+        let noise = |k: usize| 3e-3 * ((k * 7919 % 1000) as f64 / 500.0 - 1.0) * 3f64.sqrt();
+        // 3.1 Hz at 20 Hz: from sample to sample it changes by as much as noise.
+        let hum = |k: usize| 3e-3 * 2f64.sqrt() * (std::f64::consts::TAU * 3.1 * 0.05 * k as f64).sin();
+        let of = |error: &dyn Fn(usize) -> f64| (0..800).map(error).collect::<Vec<f64>>();
+        let part = |errors: &[f64]| forgotten(&[errors], 0.05) / (errors.iter().map(|e| e * e).sum::<f64>() / 800.0);
+        assert!(part(&of(&noise)) > 0.8, "{}", part(&of(&noise)));
+        assert!(part(&of(&hum)) < 0.05, "{}", part(&of(&hum)));
+    }
+
+    #[test]
     fn what_a_clock_strays_by_is_noise() {
         let mut joint = follows(5e-3);
         assert!(structure(&joint, &law()) > 1.2);

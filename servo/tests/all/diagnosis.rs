@@ -356,27 +356,21 @@ fn told(diagnosis: &gapscope_servo::schema::Diagnosis) -> Vec<(&str, &[String])>
 fn one_zero_stands_for_what_all_joints_behind_it_have() {
     let model = with_a_wrist(true);
     let stiffness = [7.6, 14.6, 4.6, 0.44, 0.64];
-    let text: String = (0..5)
-        .map(|j| {
-            format!(
-                "[joint.{}]\nstiffness = {}\ndamping = {}\n",
-                "abcde".get(j..=j).unwrap(),
-                stiffness[j],
-                0.06 * stiffness[j]
-            )
-        })
-        .collect();
     let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
-    let given = Given::from_toml(&text, &names).unwrap();
-    let logs = of_each(&model, &stiffness, |j, law| {
-        if j == 1 {
-            law[Param::Offset] = -0.2;
-        }
-    });
-    let diagnosis = diagnose(&model, &logs, &given, Vec::new(), &|_, _| {}).unwrap().diagnosis;
-    assert_eq!(told(&diagnosis), [("joint_zero_offset", &["b".to_owned()][..])]);
-    let found = of(&diagnosis, "joint_zero_offset", "offset", "b");
-    assert!((found + 0.2).abs() < 0.004, "{found}");
+    let servo = |(name, k): (&String, f64)| format!("[joint.{name}]\nstiffness = {k}\ndamping = {}\n", 0.06 * k);
+    let text: String = names.iter().zip(stiffness).map(servo).collect();
+    for (given, offset) in [(Given::from_toml(&text, &names).unwrap(), -0.2), (Given::default(), 0.15)] {
+        let logs = of_each(&model, &stiffness, |j, law| {
+            law[Param::Latency] = -0.002;
+            if j == 1 {
+                law[Param::Offset] = offset;
+            }
+        });
+        let diagnosis = diagnose(&model, &logs, &given, Vec::new(), &|_, _| {}).unwrap().diagnosis;
+        assert_eq!(told(&diagnosis), [("joint_zero_offset", &["b".to_owned()][..])]);
+        let found = of(&diagnosis, "joint_zero_offset", "offset", "b");
+        assert!((found - offset).abs() < 0.004, "{found}");
+    }
 }
 
 /// Before anybody looks for a body, all that joints have of their own is held against an error that the body makes.
@@ -390,6 +384,10 @@ fn a_body_at_a_wrist_is_found_without_a_given_servo() {
     let diagnosis = diagnose(&model, &logs, &Given::default(), Vec::new(), &|_, _| {}).unwrap().diagnosis;
     assert_eq!(told(&diagnosis), [("payload", &["d".to_owned()][..])]);
     assert_eq!(diagnosis.verdict, "explained");
+    // A drive of twice the stiffness would carry twice the body nearly as well: the two are found together.
+    let Some(Parameter::Single(mass)) = diagnosis.effects[0].parameters.get("mass") else { panic!("a mass") };
+    let [Some(low), Some(high)] = mass.ci95 else { panic!("an interval") };
+    assert!((mass.value / 0.06 - 1.0).abs() < 0.05 && low < 0.06 && high > 0.06, "{mass:?}");
 }
 
 #[test]

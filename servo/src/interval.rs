@@ -207,10 +207,10 @@ mod tests {
             sensitivity: vec![],
         };
         let slow = fit_with((0..2000).map(|k| 5e-3 * (0.01 * f64::from(k)).sin()).collect());
-        let forgets = fit_with((0..2000).map(|k| if k % 2 == 0 { 5e-3 } else { -5e-3 }).collect());
+        let forgets = fit_with((0..2000).map(|k| 5e-3 * crate::rest::tests::white(k)).collect());
         let wider = |fit: &Fit| spread().with_what_lasts(fit, &joint).deviation(Param::Coulomb).unwrap() / 0.1;
         assert!((wider(&slow) / (1.0 + LASTS).sqrt() - 1.0).abs() < 0.01, "{}", wider(&slow));
-        assert!((wider(&forgets) - 1.0).abs() < 1e-9, "{}", wider(&forgets));
+        assert!((wider(&forgets) - 1.0).abs() < 0.05, "{}", wider(&forgets));
     }
 
     #[test]

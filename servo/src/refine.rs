@@ -45,7 +45,14 @@ pub fn refine(
     }
     while !kept.is_empty() {
         let search = search_of(&kept, model, &motions, joints.len())?;
-        let settled = settle_best(&search, &kept, joints, &tried, None)?;
+        let Some(settled) = settle_best(&search, &kept, joints, &tried, None) else {
+            // Where only numbers at their bounds go with the logs, something else is there.
+            let bodies = kept.iter().filter(|own| !own.whole.is_zero());
+            let weakest = bodies.min_by(|a, b| a.nats.total_cmp(&b.nats))?.whole;
+            put(joints, &search.plain);
+            kept.retain(|own| own.whole != weakest);
+            continue;
+        };
         let samples = worth(joints, &settled.fits);
         let spread = search.spread(joints, &settled)?;
         let places = search.places();

@@ -366,7 +366,8 @@ fn one_zero_stands_for_what_all_joints_behind_it_have() {
                 law[Param::Offset] = offset;
             }
         });
-        let diagnosis = diagnose(&model, &logs, &given, Vec::new(), &|_, _| {}).unwrap().diagnosis;
+        // One log is enough, and half of the time.
+        let diagnosis = diagnose(&model, &logs[..1], &given, Vec::new(), &|_, _| {}).unwrap().diagnosis;
         assert_eq!(told(&diagnosis), [("joint_zero_offset", &["b".to_owned()][..])]);
         let found = of(&diagnosis, "joint_zero_offset", "offset", "b");
         assert!((found - offset).abs() < 0.004, "{found}");

@@ -213,10 +213,13 @@ fn correct(sensitivity: &mut [Vec<f64>], step: &[f64], scale: &[f64], before: &[
     }
 }
 
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// JᵀJ and Jᵀe.
 pub fn normal(sensitivity: &[Vec<f64>], errors: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
     let p = sensitivity.len();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut normal = DMatrix::zeros(p, p);
     for i in 0..p {
         for j in i..p {

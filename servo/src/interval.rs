@@ -5,15 +5,15 @@
 //! Beside noise, a servo's own loop may answer a little later or earlier than its law: see [`LOOP`].
 //! Source: Ljung, System Identification, 2nd ed., section 9.3; White, Econometrica 50(1) 1982.
 
-use crate::fit::{Fit, normal};
+use crate::fit::{Fit, dot, normal};
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
 use crate::rest::lasting;
 use crate::simulate::errors;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Blocks into which all errors of a joint are cut.
-pub(crate) const BLOCKS: usize = 24;
+const BLOCKS: usize = 24;
 /// Half a 95 % interval over the standard deviation that blocks show: Student's t at 97.5 % with as many blocks less one, times
 /// what they do not show, as other joints' laws are taken as known. Of 66 numbers of 24 simulated arms whose kinds are right,
 /// .95 lie within it, and .76 without the second factor.
@@ -21,7 +21,7 @@ pub const REACH: f64 = 2.07 * 1.6;
 /// Variance that errors add which last, as a multiple of that of their blocks: they are the model's, and go another way in another
 /// log. Of 16 numbers that two sets of three logs of a real arm (SO-101) give, 15 differ by two joint standard errors at most, and 9 of
 /// 17 without this.
-pub(crate) const LASTS: f64 = 10.0;
+const LASTS: f64 = 10.0;
 /// A scale known to a third or worse is not known: ratios are given instead of torques.
 const KNOWN: f64 = 0.33;
 
@@ -61,6 +61,29 @@ pub(crate) fn late(fit: &Fit, joint: &Joint) -> [Vec<f64>; 2] {
     })
 }
 
+/// Samples of a block.
+fn block(errors: &[f64]) -> usize {
+    errors.len().div_ceil(BLOCKS).max(1)
+}
+
+/// Σ g gᵀ over blocks of time, g the pull of the errors there on numbers that change them by these columns.
+pub(crate) fn scatter(columns: &[&[f64]], errors: &[f64]) -> DMatrix<f64> {
+    let mut scatter = DMatrix::zeros(columns.len(), columns.len());
+    let length = block(errors);
+    for (k, errors) in errors.chunks(length).enumerate() {
+        let from = k * length;
+        let pull = |column: &&[f64]| dot(&column[from..from + errors.len()], errors);
+        let pull = DVector::from_iterator(columns.len(), columns.iter().map(pull));
+        scatter += &pull * pull.transpose();
+    }
+    scatter
+}
+
+/// By how much the variance that errors of a fit add is more in another log, to which what lasts of them is another.
+pub(crate) fn more_by_what_lasts(fit: &Fit, joint: &Joint) -> f64 {
+    1.0 + LASTS * lasting(joint, &fit.errors) / fit.cost.max(1e-300)
+}
+
 impl Spread {
     /// Of a fit of a joint.
     pub fn of(fit: &Fit, joint: &Joint) -> Spread {
@@ -70,24 +93,12 @@ impl Spread {
             // What does nothing to the errors is not determined: its variance is next to infinite.
             information[(i, i)] = information[(i, i)] * (1.0 + 1e-9) + 1e-30;
         }
-        let length = fit.errors.len().div_ceil(BLOCKS).max(1);
-        let mut pulls = DMatrix::zeros(p, p);
-        for from in (0..fit.errors.len()).step_by(length) {
-            let to = (from + length).min(fit.errors.len());
-            let pull: Vec<f64> = fit
-                .sensitivity
-                .iter()
-                .map(|s| s[from..to].iter().zip(&fit.errors[from..to]).map(|(s, e)| s * e).sum())
-                .collect();
-            for i in 0..p {
-                for j in 0..p {
-                    pulls[(i, j)] += pull[i] * pull[j];
-                }
-            }
-        }
+        let sensitivity: Vec<&[f64]> = fit.sensitivity.iter().map(Vec::as_slice).collect();
+        let pulls = scatter(&sensitivity, &fit.errors);
         let inverse = information.try_inverse().unwrap_or_else(|| DMatrix::from_diagonal_element(p, p, 1e30));
         // At the minimum the pulls of all blocks come to nothing in as many directions as there are parameters.
-        let left = 1.0 - p as f64 / fit.errors.len().div_ceil(length).max(p + 2) as f64;
+        let blocks = fit.errors.chunks(block(&fit.errors)).len();
+        let left = 1.0 - p as f64 / blocks.max(p + 2) as f64;
         let mut covariance = &inverse * pulls * &inverse / left;
         for moved in late(fit, joint) {
             let (_, pull) = normal(&fit.sensitivity, &moved);
@@ -99,7 +110,7 @@ impl Spread {
 
     /// The same for another log of the joint, to which what lasts of the errors of the fit is another.
     pub fn with_what_lasts(mut self, fit: &Fit, joint: &Joint) -> Spread {
-        self.covariance *= 1.0 + LASTS * lasting(joint, &fit.errors) / fit.cost.max(1e-300);
+        self.covariance *= more_by_what_lasts(fit, joint);
         self
     }
 

@@ -6,11 +6,10 @@
 use crate::account::Account;
 use crate::around::Motion;
 use crate::choice::Projector;
-use crate::fit::{Fit, fit};
-use crate::interval::{self, BLOCKS, LASTS};
+use crate::fit::{Fit, dot, fit};
+use crate::interval::{late, more_by_what_lasts, scatter};
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
-use crate::rest::lasting;
 use crate::simulate::errors;
 use crate::weigh::independent;
 use crate::whole::{Around, Whole, around, ball, changed, put, shifted};
@@ -297,27 +296,20 @@ impl<'a> Search<'a> {
         let samples = worth(joints, &settled.fits);
         let columns = self.columns(joints, &settled.fits, &settled.values, &base);
         // What is known beforehand scatters as it says.
-        let mut scatter = self.damped(&settled.equations, DAMPING) - &settled.equations.normal;
-        let mut late = [DVector::zeros(p), DVector::zeros(p)];
+        let mut total = self.damped(&settled.equations, DAMPING) - &settled.equations.normal;
+        let mut shifts = [DVector::zeros(p), DVector::zeros(p)];
         for (j, fit) in settled.fits.iter().enumerate() {
             let Some(fit) = fit else { continue };
             let weight = self.weight(j, fit, samples[j]);
-            let pull = |errors: &[f64], from: usize| {
-                let of =
-                    |number: &Vec<(Vec<f64>, Vec<f64>)>| weight * dot(&number[j].0[from..from + errors.len()], errors);
-                DVector::from_iterator(p, columns.iter().map(of))
-            };
-            let lasts = 1.0 + LASTS * lasting(&joints[j], &fit.errors) / fit.cost.max(1e-300);
-            let length = fit.errors.len().div_ceil(BLOCKS).max(1);
-            for (k, errors) in fit.errors.chunks(length).enumerate() {
-                let pull = pull(errors, k * length);
-                scatter += lasts * &pull * pull.transpose();
+            let own: Vec<&[f64]> = columns.iter().map(|number| number[j].0.as_slice()).collect();
+            total += weight * weight * more_by_what_lasts(fit, &joints[j]) * scatter(&own, &fit.errors);
+            for (shift, moved) in shifts.iter_mut().zip(late(fit, &joints[j])) {
+                *shift += DVector::from_iterator(p, own.iter().map(|column| weight * dot(column, &moved)));
             }
-            late.iter_mut().zip(interval::late(fit, &joints[j])).for_each(|(late, moved)| *late += pull(&moved, 0));
         }
-        late.iter().for_each(|late| scatter += late * late.transpose());
+        shifts.iter().for_each(|shift| total += shift * shift.transpose());
         let inverse = self.covariance(settled);
-        Some(&inverse * scatter * &inverse)
+        Some(&inverse * total * &inverse)
     }
 
     /// −(N + λ D)⁻¹ g.
@@ -390,10 +382,6 @@ impl<'a> Search<'a> {
         };
         fits.iter().zip(samples).zip(&self.least).map(of).sum()
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// A fit of each joint's account, by so many rounds at most.

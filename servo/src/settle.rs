@@ -59,6 +59,15 @@ pub(crate) struct Settled {
     steps: usize,
 }
 
+/// What a number of the whole arm does to a joint, for each unit of it.
+#[derive(Default)]
+struct Column {
+    /// Change of the errors that the joint's own parameters cannot make up for.
+    left: Vec<f64>,
+    /// By how much each of its free parameters makes up for the rest.
+    answer: Vec<f64>,
+}
+
 /// Normal equations of the numbers.
 pub(crate) struct Equations {
     normal: DMatrix<f64>,
@@ -176,23 +185,16 @@ impl<'a> Search<'a> {
         self.places().into_iter().all(|(whole, numbers)| !whole.at_bound(self.model, &values[numbers]))
     }
 
-    /// Changes of the errors by each number, `[number][joint]`, at fits of the joints as they are surrounded now, by `base`: what the
-    /// joints' own parameters cannot make up for, and by how much of each they make up for the rest.
-    fn columns(
-        &self,
-        joints: &mut [Joint],
-        fits: &[Option<Fit>],
-        values: &[f64],
-        base: &Around,
-    ) -> Vec<Vec<(Vec<f64>, Vec<f64>)>> {
+    /// What each number does to each joint, `[number][joint]`, at fits of the joints as they are surrounded now, by `base`.
+    fn columns(&self, joints: &mut [Joint], fits: &[Option<Fit>], values: &[f64], base: &Around) -> Vec<Vec<Column>> {
         let mut moved = Vec::with_capacity(self.probes.len());
         let own: Vec<Whole> = self.places().into_iter().flat_map(|(whole, at)| vec![whole; at.len()]).collect();
         let turns = self.turns();
         for (i, (probe, whole)) in self.probes.iter().zip(own).enumerate() {
             if self.is_ball && turns.iter().any(|(_, own)| *own == i) {
-                let nothing = |fit: &Option<Fit>| {
-                    fit.as_ref()
-                        .map_or_else(Default::default, |fit| (vec![0.0; fit.errors.len()], vec![0.0; fit.free.len()]))
+                let nothing = |fit: &Option<Fit>| match fit {
+                    Some(fit) => Column { left: vec![0.0; fit.errors.len()], answer: vec![0.0; fit.free.len()] },
+                    None => Column::default(),
                 };
                 moved.push(fits.iter().map(nothing).collect());
                 continue;
@@ -205,12 +207,12 @@ impl<'a> Search<'a> {
             let seen = is_there.then(|| self.around(&there)).flatten();
             let probe = if seen.is_some() { NEAR * probe } else { *probe };
             put(joints, &seen.unwrap_or_else(|| shifted(base, &self.plain, &self.probed[i])));
-            let columns: Vec<(Vec<f64>, Vec<f64>)> = joints
+            let columns: Vec<Column> = joints
                 .par_iter()
                 .zip(fits)
                 .enumerate()
                 .map(|(j, (joint, fit))| {
-                    let Some(fit) = fit else { return Default::default() };
+                    let Some(fit) = fit else { return Column::default() };
                     let mut law = fit.law;
                     if whole == Whole::Offset(j) {
                         law[Param::Offset] += probe;
@@ -218,7 +220,8 @@ impl<'a> Search<'a> {
                     let mut out = Vec::new();
                     errors(&law, &joint.runs, &mut out);
                     let change = out.iter().zip(&fit.errors).map(|(there, here)| (there - here) / probe).collect();
-                    Projector::new(&fit.sensitivity).split(change)
+                    let (left, answer) = Projector::new(&fit.sensitivity).split(change);
+                    Column { left, answer }
                 })
                 .collect();
             moved.push(columns);
@@ -249,9 +252,9 @@ impl<'a> Search<'a> {
             let Some(fit) = fit else { continue };
             let weight = self.weight(j, fit, samples[j]);
             for a in 0..p {
-                gradient[a] += weight * dot(&columns[a][j].0, &fit.errors);
+                gradient[a] += weight * dot(&columns[a][j].left, &fit.errors);
                 for b in 0..p {
-                    normal[(a, b)] += weight * dot(&columns[a][j].0, &columns[b][j].0);
+                    normal[(a, b)] += weight * dot(&columns[a][j].left, &columns[b][j].left);
                 }
             }
         }
@@ -261,7 +264,7 @@ impl<'a> Search<'a> {
             gradient[own] += (values[own] - ball(values[mass])) / (usual * usual);
         }
         let answers =
-            columns.into_iter().map(|number| number.into_iter().map(|(_, answer)| answer).collect()).collect();
+            columns.into_iter().map(|number| number.into_iter().map(|column| column.answer).collect()).collect();
         Equations { normal, gradient, answers }
     }
 
@@ -301,7 +304,7 @@ impl<'a> Search<'a> {
         for (j, fit) in settled.fits.iter().enumerate() {
             let Some(fit) = fit else { continue };
             let weight = self.weight(j, fit, samples[j]);
-            let own: Vec<&[f64]> = columns.iter().map(|number| number[j].0.as_slice()).collect();
+            let own: Vec<&[f64]> = columns.iter().map(|number| number[j].left.as_slice()).collect();
             total += weight * weight * more_by_what_lasts(fit, &joints[j]) * scatter(&own, &fit.errors);
             for (shift, moved) in shifts.iter_mut().zip(late(fit, &joints[j])) {
                 *shift += DVector::from_iterator(p, own.iter().map(|column| weight * dot(column, &moved)));

@@ -107,10 +107,11 @@ pub fn fit(start: &Law, free: &[Param], runs: &[Run], ranges: &Ranges, rounds: u
             let Some(more) = descent.step(TRIES_CORRECTED) else { break };
             gained = more;
         }
-        descent.differentiate();
+        // So short a step leaves sensitivities as they were.
         if first < SETTLED {
             break;
         }
+        descent.differentiate();
     }
     let Descent { law, errors, cost, sensitivity, .. } = descent;
     Fit { law, free: free.to_vec(), cost, errors, sensitivity }
@@ -186,7 +187,10 @@ impl<'a> Descent<'a> {
             if cost < self.cost {
                 let gained = (self.cost - cost) / self.cost.max(1e-300);
                 let moved: Vec<f64> = self.free.iter().map(|&param| there[param] - self.law[param]).collect();
-                correct(&mut self.sensitivity, &moved, &scale, &self.errors, &out);
+                // What so short a step does to the errors is rounding.
+                if gained >= SETTLED {
+                    correct(&mut self.sensitivity, &moved, &scale, &self.errors, &out);
+                }
                 (self.law, self.errors, self.cost) = (there, out, cost);
                 self.damping = (0.2 * self.damping).max(1e-9);
                 return Some(gained);

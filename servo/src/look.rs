@@ -157,6 +157,11 @@ impl<'a> Before<'a> {
         let upright = is_turned.then(|| Search::new(&[whole], self.model, self.motions, &self.fits, true)).flatten();
         let search = upright.as_ref().unwrap_or(search);
         let alone = search.settle(joints, &self.without_load, &vec![0.0; whole.numbers()])?;
+        // By all that it does where nothing else does it, and all that it saves.
+        let most = saved(joints, &self.poor.0, &self.without_load, &alone.fits);
+        if alone.nats() - self.price(whole, joints) + most <= TAKEN {
+            return None;
+        }
         put(joints, &search.around(&alone.values)?);
         let accounts = restored(joints, chosen, &alone.fits);
         let settled = search.settle(joints, &accounts, &alone.values).unwrap_or(alone);

@@ -200,11 +200,11 @@ impl<'a> Search<'a> {
                 continue;
             }
             // What a body does goes by the square of its lever, and what a tilt does by its sine: either is seen where it is, and so
-            // near that it goes straight on. Of the rest the change about the nominal arm is laid on the surroundings of now.
-            let is_there = !whole.is_zero() && values.iter().any(|value| *value != 0.0);
+            // near that it goes straight on. Of the rest, and of a body without a mass to sit on, the change about the nominal arm is
+            // laid on the surroundings of now.
             let mut there = values.to_vec();
             there[i] += NEAR * probe;
-            let seen = is_there.then(|| self.around(&there)).flatten();
+            let seen = if whole.is_zero() { None } else { self.around(&there) };
             let probe = if seen.is_some() { NEAR * probe } else { *probe };
             put(joints, &seen.unwrap_or_else(|| shifted(base, &self.plain, &self.probed[i])));
             let columns: Vec<Column> = joints

@@ -11,7 +11,7 @@ use crate::law::{Law, Param};
 use crate::prepare::Joint;
 use crate::rest::lasting;
 use crate::simulate::errors;
-use crate::weigh::{independent, least, tracking, weigh};
+use crate::weigh::{independent, least, least_tried, tracking, weigh};
 
 /// Rounds of a fit that only decides whether a kind is worth more.
 pub(crate) const TRIAL: usize = 3;
@@ -169,7 +169,7 @@ impl Choice<'_> {
             let gain = if first && kind.hides() { slope.max(self.glance(best, kinds, kind)) } else { slope };
             let rest = (best.cost - gain).max(1e-3 * best.cost);
             let nats = 0.5 * samples * (best.cost / rest).ln() - 0.5 * samples.ln() - kind.cost();
-            if nats > 0.0 && gain > self.least(rest) {
+            if nats > 0.0 && gain > self.least_added(rest) {
                 promises.push((nats, kind));
             } else {
                 why.push(Comparison { proposed: kind, nats, taken: false, last: false });
@@ -226,6 +226,15 @@ impl Choice<'_> {
     /// The least fall of the squared error that counts, where `rest` is left.
     pub(crate) fn least(&self, rest: f64) -> f64 {
         least(rest, self.perfect)
+    }
+
+    /// The least fall of the squared error for which a kind is added, where `rest` is left. While nobody has looked at the other joints,
+    /// what they jolt would call up springs.
+    pub(crate) fn least_added(&self, rest: f64) -> f64 {
+        match self.bar {
+            Bar::Noise => self.least(rest),
+            Bar::WhatLasts => least_tried(rest),
+        }
     }
 
     pub(crate) fn relevant(&self, rich: &Fit, poor: &Fit) -> bool {

@@ -168,7 +168,7 @@ fn choose_by_all(joint: &mut Joint, from: &From, bar: Bar) -> Chosen {
             let rich = choice.fit(&best.law, &with, Some(kind), TRIAL);
             let samples = independent(choice.joint, &rich.errors);
             let nats = choice.nats(&rich, &best, kind, samples);
-            let wins = nats > TAKEN && choice.relevant(&rich, &best);
+            let wins = nats > TAKEN && best.cost - rich.cost > choice.least_added(rich.cost);
             why.push(Comparison { proposed: kind, nats, taken: false, last: false });
             if wins && top.as_ref().is_none_or(|(most, _, _)| nats > *most) {
                 top = Some((nats, kind, rich));

@@ -115,7 +115,11 @@ impl Kind {
             Kind::SpeedLimit => &[(Param::Speed, "limit", "rad/s")],
             Kind::DeadBand => &[(Param::DeadBand, "width", "rad")],
             Kind::Elasticity => &[(Param::Spring, "stiffness", "N m/rad"), (Param::Armature, "rotor", "kg m²")],
-            Kind::Backlash => &[(Param::Gap, "gap", "rad"), (Param::Armature, "rotor", "kg m²")],
+            Kind::Backlash => &[
+                (Param::Gap, "gap", "rad"),
+                (Param::Armature, "rotor", "kg m²"),
+                (Param::Contact, "contact_damping", "-"),
+            ],
             Kind::Feedforward => &[(Param::Feedforward, "feedforward", "N m s/rad")],
         }
     }
@@ -157,6 +161,7 @@ impl Kind {
             let rotor = 0.5 * law[Param::Scale] * inertia;
             law[Param::Armature] = law[Param::Armature].max(rotor);
             law[Param::Spring] = CONTACT;
+            law[Param::Contact] = scale[Param::Contact as usize];
         }
         if self == Kind::Feedforward {
             // A derivative gain on the error, at so many times critical damping.
@@ -169,7 +174,7 @@ impl Kind {
         }
         let starts = |param: Param| self.is_threshold() || !given[param as usize];
         for &(param, _, _) in self.parameters().iter().filter(|(param, _, _)| starts(*param)) {
-            if param != Param::Armature || self == Kind::Armature {
+            if !matches!(param, Param::Armature | Param::Contact) || self == Kind::Armature {
                 law[param] = start * scale[param as usize];
             }
         }

@@ -13,6 +13,7 @@
 //! Source of the friction with load: Duclusaud, Passault, Padois, Ly, "Extended friction models for the physics simulation of
 //! servo actuators", ICRA 2025.
 
+use crate::wind_up::DAMPING;
 use gapscope_effects::{DeadBand, SpeedLimit};
 
 /// A parameter of a joint's law. `Scale` is 1/s; torques are in units of w.
@@ -57,12 +58,14 @@ pub enum Param {
     Spring,
     /// Play between motor and link, rad.
     Gap,
+    /// Damping ratio of the teeth that end a play: ζ leaves exp(−πζ/√(1 − ζ²)) of the speed at which they meet.
+    Contact,
     /// λ, unit of w per rad/s of the set point: a derivative gain that acts on the error, or a feed-forward of speed.
     Feedforward,
 }
 
 /// How many parameters a law has.
-pub const PARAMS: usize = 20;
+pub const PARAMS: usize = 21;
 
 impl Param {
     /// All, in the order of [`Law::values`].
@@ -86,6 +89,7 @@ impl Param {
         Param::Feedback,
         Param::Spring,
         Param::Gap,
+        Param::Contact,
         Param::Feedforward,
     ];
 
@@ -123,6 +127,7 @@ impl Default for Law {
         values[Param::Speed as usize] = f64::INFINITY;
         values[Param::Feedback as usize] = 1.0;
         values[Param::Spring as usize] = f64::INFINITY;
+        values[Param::Contact as usize] = DAMPING;
         Law { values, link_side: false }
     }
 }

@@ -3,7 +3,7 @@
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
 use crate::run::Signal;
-use crate::wind_up::{CONTACT, spring_of};
+use crate::wind_up::{CONTACT, DAMPING, spring_of};
 use gapscope_dynamics::Model;
 use gapscope_effects::{
     Armature, Backlash, CoulombFriction, Effect, EffectError, JointElasticity, JointZeroOffset, LoadDependentFriction,
@@ -47,6 +47,9 @@ pub struct DriveModel {
     /// Speed up to which dry friction grows in proportion to it, rad/s: a joint under load creeps. At zero it sticks.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub creep_velocity: f64,
+    /// Damping ratio of the teeth that end a play, where the joint has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_damping: Option<f64>,
     /// Whether the encoder is on the link's side of a spring or of play; else it is on the motor's.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub link_side: bool,
@@ -188,6 +191,7 @@ impl ServoModel {
                 load_rise: (law[Param::LoadRise] > 0.0)
                     .then(|| LoadRise { rise: law[Param::LoadRise], stribeck_velocity: law[Param::StribeckVelocity] }),
                 creep_velocity: law[Param::Creep],
+                contact_damping: (law[Param::Gap] > 0.0).then_some(law[Param::Contact]),
                 link_side: law.link_side,
             };
             (joint.name.clone(), drive)
@@ -224,7 +228,7 @@ impl ServoModel {
         for (joint, drive) in &read.drive {
             let above = |x: f64| x.is_finite() && x > 0.0;
             let least = |x: f64| x.is_finite() && x >= 0.0;
-            let limits = [drive.limit, drive.speed_limit, drive.gain];
+            let limits = [drive.limit, drive.speed_limit, drive.gain, drive.contact_damping];
             let sound = above(drive.torque_per_unit)
                 && above(drive.feedback)
                 && [drive.damping, drive.feedforward, drive.dead_band, drive.creep_velocity].into_iter().all(least)
@@ -311,6 +315,7 @@ impl ServoModel {
                 }
                 Effect::Backlash(e) if e.gap.contains_key(&joint.name) => {
                     (law[Param::Gap], law[Param::Spring]) = (at(&e.gap), CONTACT);
+                    law[Param::Contact] = drive.contact_damping.unwrap_or(DAMPING);
                     law.link_side = drive.link_side;
                 }
                 _ => {}

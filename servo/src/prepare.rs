@@ -257,6 +257,7 @@ fn ranges(sizes: &Sizes, dt: f64) -> Ranges {
     set(Param::Feedback, 1e-6, 1e6, 1.0);
     set(Param::Spring, SPRING[0], SPRING[1], 0.2 * SPRING[1]);
     set(Param::Gap, 0.0, 0.15, 0.01);
+    set(Param::Contact, 0.02, 1.5, 0.1);
     Ranges { bounds, scale, absolute: [f64::NAN; PARAMS] }
 }
 

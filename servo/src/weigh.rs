@@ -7,17 +7,25 @@ use crate::prepare::Joint;
 use crate::run::Run;
 use crate::simulate::{STEP_PART, STEPS, simulate};
 
-/// An effect must lower the squared error by this share of what is left, and its square root by this share of perfect
-/// tracking's error: no servo is modelled to better, and no integrator is another's to better.
-const RELEVANT: [f64; 2] = [0.04, 0.005];
+/// An effect must lower the squared error by this share of what is left.
+const RELEVANT: f64 = 0.04;
+/// And its square root by this share of perfect tracking's error: no servo is modelled to better, and no integrator is another's to
+/// better.
+const TRACKED: f64 = 0.005;
 
 /// By how much half a step may change a path, against what is left of the log or the encoder's rounding; and the shortest step, s.
 const FOLLOWS: f64 = 0.3;
 const FINEST: f64 = 5e-4;
 
+/// The least fall of a joint's squared error for which a kind is tried, where `rest` is left. Beside an account that lacks others, or
+/// is at their first numbers, a kind lowers it by less than it is missed by once all are right.
+pub fn least_tried(rest: f64) -> f64 {
+    RELEVANT * rest
+}
+
 /// The least fall of a joint's squared error that counts, where `rest` is left and perfect tracking leaves `perfect`.
 pub fn least(rest: f64, perfect: f64) -> f64 {
-    (RELEVANT[0] * rest).max(RELEVANT[1] * RELEVANT[1] * perfect)
+    least_tried(rest).max(TRACKED * TRACKED * perfect)
 }
 
 /// Squared error of perfect tracking, by the weights of a joint's runs.

@@ -6,8 +6,9 @@
 
 use crate::law::{END, Law, Param, Row, way};
 
-/// Damping ratio of the spring: what steel and plastic have; no log of a servo tells it apart.
-const DAMPING: f64 = 0.05;
+/// Damping ratio of the spring: what steel and plastic have; no log of a servo tells it apart. That of teeth a log tells, as it
+/// stands for how they come off each other.
+pub const DAMPING: f64 = 0.05;
 
 /// Frequency at which a link swings on the teeth that end its play, rad/s: 20 Hz, as hard as steps of 1 to 2 ms follow.
 pub const CONTACT: f64 = 125.0;
@@ -38,6 +39,10 @@ impl Law {
         self[Param::Spring].is_finite()
     }
 
+    fn damping_ratio(&self) -> f64 {
+        if self[Param::Gap] > 0.0 { self[Param::Contact] } else { DAMPING }
+    }
+
     /// What lies between them, where the bodies' mean inertia is M; `None` where they turn as one.
     pub fn shaft(&self, mass: f64) -> Option<Shaft> {
         self.winds_up().then(|| {
@@ -45,7 +50,7 @@ impl Law {
             let frequency = self[Param::Spring];
             Shaft {
                 stiffness: inertia * frequency * frequency,
-                damping: 2.0 * DAMPING * inertia * frequency,
+                damping: 2.0 * self.damping_ratio() * inertia * frequency,
                 half_gap: 0.5 * self[Param::Gap],
             }
         })
@@ -155,6 +160,20 @@ mod tests {
         let shaft = law.shaft(0.02).unwrap();
         let rest = shaft.at_rest(0.3, false, |_| 0.45);
         assert!((rest.link[0] - (0.3 - 0.02 - 0.45 / (0.1 * 0.02 * 150.0 * 150.0))).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_link_comes_off_its_teeth_at_the_part_of_its_speed_that_their_damping_leaves() {
+        for ratio in [0.05, 0.3] {
+            let mut law = law(125.0, 0.04);
+            law[Param::Contact] = ratio;
+            let start = Wound { link: [0.0, 0.5], ..Wound::default() };
+            let path = run(&law, start, 0.02, 8000, 5e-5);
+            let flies_back = path.iter().find(|state| state.link[1] < 0.0 && state.link[0] < 0.0).unwrap();
+            let back = flies_back.link[1];
+            let left = (-std::f64::consts::PI * ratio / (1.0_f64 - ratio * ratio).sqrt()).exp();
+            assert!((-back / 0.5 - left).abs() < 0.05, "{ratio}: {} for {left}", -back / 0.5);
+        }
     }
 
     #[test]

@@ -170,6 +170,7 @@ mod tests {
             dead_band: 0.0,
             load_rise: None,
             creep_velocity: 0.0,
+            contact_damping: None,
             link_side: false,
         };
         let of_actuator = |drive: &DriveModel| actuator("elbow", drive).map(|line| position(&line));

@@ -13,7 +13,6 @@
 //! Source of the friction with load: Duclusaud, Passault, Padois, Ly, "Extended friction models for the physics simulation of
 //! servo actuators", ICRA 2025.
 
-use crate::wind_up::DAMPING;
 use gapscope_effects::{DeadBand, SpeedLimit};
 
 /// A parameter of a joint's law. `Scale` is 1/s; torques are in units of w.
@@ -63,6 +62,10 @@ pub enum Param {
     /// λ, unit of w per rad/s of the set point: a derivative gain that acts on the error, or a feed-forward of speed.
     Feedforward,
 }
+
+/// Damping ratio of a spring: what steel and plastic have; no log of a servo tells it apart. That of teeth a log tells, as it
+/// stands for how they come off each other.
+pub const DAMPING: f64 = 0.05;
 
 /// How many parameters a law has.
 pub const PARAMS: usize = 21;

@@ -1,9 +1,9 @@
 //! The corrected servo arm as a file: what drives each joint, and its effects. Schema `gapscope.model/1` with a `drive`.
 
-use crate::law::{Law, Param};
+use crate::law::{DAMPING, Law, Param};
 use crate::prepare::Joint;
 use crate::run::Signal;
-use crate::wind_up::{CONTACT, DAMPING, spring_of};
+use crate::wind_up::{CONTACT, spring_of};
 use gapscope_dynamics::Model;
 use gapscope_effects::{
     Armature, Backlash, CoulombFriction, Effect, EffectError, JointElasticity, JointZeroOffset, LoadDependentFriction,

@@ -4,11 +4,7 @@
 //! κ (x − play) + δ ẋ, and nothing within the play. κ is told by the frequency ω at which the link swings behind a motor that
 //! stands: κ = σ M ω². The step is that of a rigid joint, the torque between taken at the same part of it.
 
-use crate::law::{END, Law, Param, Row, way};
-
-/// Damping ratio of the spring: what steel and plastic have; no log of a servo tells it apart. That of teeth a log tells, as it
-/// stands for how they come off each other.
-pub const DAMPING: f64 = 0.05;
+use crate::law::{DAMPING, END, Law, Param, Row, way};
 
 /// Frequency at which a link swings on the teeth that end its play, rad/s: 20 Hz, as hard as steps of 1 to 2 ms follow.
 pub const CONTACT: f64 = 125.0;

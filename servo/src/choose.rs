@@ -89,22 +89,39 @@ fn begin(joint: &mut Joint, bar: Bar) -> (Choice<'_>, Vec<Kind>, Vec<Kind>) {
     (Choice { joint, base, perfect: 0.0, bare: law, bar }, kinds, possible)
 }
 
+impl Choice<'_> {
+    /// The law of next to nothing, or the numbers of another for the same parameters, where a fit comes nearer from these.
+    fn nearer(&self, law: &Law, kinds: &[Kind]) -> Law {
+        let mut near = self.bare;
+        self.free(kinds).into_iter().for_each(|param| near[param] = law[param]);
+        let [bare, near] = [self.bare, near].map(|law| self.fit(&law, kinds, None, TRIAL));
+        if near.cost < bare.cost { near.law } else { bare.law }
+    }
+}
+
 /// Where a choice begins.
 #[derive(Debug, Clone, Default)]
 pub enum From {
     /// At nothing.
     #[default]
     Nothing,
+    /// At nothing, or at the numbers of this law, where they miss less.
+    Near(Law),
     /// At an account that was found before, in other surroundings.
     Account(Law, Vec<Kind>),
 }
 
 impl From {
+    /// At nothing, or near a law where there is one.
+    pub fn near(law: &Option<Law>) -> From {
+        law.map_or(From::Nothing, From::Near)
+    }
+
     /// Its law, where it has one.
     pub fn law(&self) -> Option<Law> {
         match self {
             From::Nothing => None,
-            From::Account(law, _) => Some(*law),
+            From::Near(law) | From::Account(law, _) => Some(*law),
         }
     }
 }
@@ -148,6 +165,7 @@ fn choose_by_all(joint: &mut Joint, from: &From, bar: Bar) -> Chosen {
     let mut why = Vec::new();
     let start = match from {
         From::Nothing => choice.bare,
+        From::Near(law) => choice.nearer(law, &kinds),
         From::Account(law, own) => {
             kinds.clone_from(own);
             *law

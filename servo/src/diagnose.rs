@@ -75,9 +75,8 @@ pub fn diagnose(
     let mut all = joints(model, episodes, given);
     let excited = all.iter().any(|joint| joint.moved);
     progress("what drives each joint", 0.1);
-    // An arm of one joint has nothing that the joint alone does not say.
-    let first = if all.len() == 1 { Bar::WhatLasts } else { Bar::Noise };
-    let mut chosen = choose_all(&mut all, first);
+    let nothing = vec![From::Nothing; all.len()];
+    let mut chosen = choose_all(&mut all, &nothing);
     progress("what the whole arm has", 0.5);
     // The search goes by what was measured: an arm without the effect moves otherwise than the one that has it.
     let moved = motions(model, &all, &vec![None; all.len()], episodes);
@@ -91,7 +90,7 @@ pub fn diagnose(
         let rigid: Vec<From> = chosen.iter().map(|own| own.as_ref().map_or(From::Nothing, Chosen::rigid)).collect();
         drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
         // One joint alone feels no other's motion.
-        if all.len() == 1 && wholes.is_empty() {
+        if all.len() == 1 && wholes.is_empty() && pass > 0 {
             break;
         }
         // Once more, in surroundings by what was found of the others.
@@ -105,8 +104,8 @@ pub fn diagnose(
         let had = !wholes.is_empty();
         real = settle(model, &mut all, &mut chosen, &mut wholes, &laws, episodes).unwrap_or(real);
         // What joints have beside an effect of the whole arm was found beside its first numbers.
-        let accounts: Vec<From> =
-            chosen.iter().zip(&rigid).map(|own| if had { From::Nothing } else { begin(own) }).collect();
+        let anew = |from: From| if had { From::near(&from.law()) } else { from };
+        let accounts: Vec<From> = chosen.iter().zip(&rigid).map(|own| anew(begin(own))).collect();
         let stay: Vec<bool> =
             chosen.iter().map(|own| pass > 0 && own.as_ref().is_some_and(|own| own.fit.law.winds_up())).collect();
         choose_anew(&mut all, &accounts, &stay, &mut chosen);
@@ -223,9 +222,9 @@ pub fn diagnose(
 /// Constants that an effect of the whole arm may be behind.
 const CONSTANT: [Kind; 2] = [Kind::Bias, Kind::Offset];
 
-/// Chooses all joints from nothing on.
-fn choose_all(joints: &mut [Joint], bar: Bar) -> Vec<Option<Chosen>> {
-    joints.par_iter_mut().map(|joint| joint.moved.then(|| choose(joint, &From::Nothing, bar))).collect()
+/// Chooses all joints, each from where it says.
+fn choose_all(joints: &mut [Joint], from: &[From]) -> Vec<Option<Chosen>> {
+    joints.par_iter_mut().zip(from).map(|(joint, from)| joint.moved.then(|| choose(joint, from, Bar::Noise))).collect()
 }
 
 /// Chooses joints anew; those that stay keep their account, and get its numbers in their surroundings.
@@ -282,6 +281,7 @@ fn find_wholes(
         if !is_missed(joints, (&there, &next.laws), (&real, &before)) {
             return (found, looked.ties);
         }
+        let laws = next.laws.clone();
         real = there;
         taken.push(next.whole);
         match next.whole {
@@ -290,7 +290,8 @@ fn find_wholes(
             _ => found.push(next),
         }
         surround(joints, &real, &moved);
-        *chosen = choose_all(joints, Bar::Noise);
+        let near: Vec<From> = laws.iter().map(From::near).collect();
+        *chosen = choose_all(joints, &near);
     }
 }
 

@@ -172,6 +172,10 @@ impl Kind {
             }
             return;
         }
+        // What stands on a kind is felt where that kind is.
+        for &(param, _, _) in self.base().iter().flat_map(|base| base.parameters()) {
+            law[param] = law[param].max(start * scale[param as usize]);
+        }
         let starts = |param: Param| self.is_threshold() || !given[param as usize];
         for &(param, _, _) in self.parameters().iter().filter(|(param, _, _)| starts(*param)) {
             if !matches!(param, Param::Armature | Param::Contact) || self == Kind::Armature {
@@ -226,10 +230,10 @@ impl Kind {
         matches!(self, Kind::Coulomb | Kind::Viscous | Kind::Armature | Kind::Bias | Kind::DampingError)
     }
 
-    /// Whether others stand in for it in a fit that has them before: friction for limits, which slow a joint down as well, and an
-    /// early set point for one whose speed the drive knows.
+    /// Whether others stand in for it in a fit that has them before: friction for limits and dead bands, which slow a joint down as
+    /// well, the drive's damping for friction under which a joint creeps, and an early set point for one whose speed the drive knows.
     pub fn hides(self) -> bool {
-        matches!(self, Kind::Saturation | Kind::SpeedLimit | Kind::Feedforward)
+        matches!(self, Kind::Saturation | Kind::SpeedLimit | Kind::DeadBand | Kind::Creep | Kind::Feedforward)
     }
 
     /// Whether one joint feels like this what a body at the flange or a tilted base does to it: by gravity a torque, a turn or

@@ -2,7 +2,7 @@
 
 use crate::account::{Account, Accounts, accounts, without};
 use crate::around::Motion;
-use crate::choice::{BEYOND, TAKEN};
+use crate::choice::{BEYOND, SURE, TAKEN};
 use crate::choose::{Chosen, restore};
 use crate::fit::Fit;
 use crate::kinds::Kind;
@@ -197,7 +197,7 @@ impl<'a> Before<'a> {
             return None;
         }
         let (covariance, laws) = (search.covariance(&settled), settled.laws());
-        let is_told = whole.is_told(&settled.values, &covariance);
+        let is_told = nats > SURE || whole.is_told(&settled.values, &covariance);
         is_told.then_some(Found { whole, values: settled.values, covariance, nats, share, laws })
     }
 }

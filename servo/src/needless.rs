@@ -1,6 +1,6 @@
 //! What a fit does not miss is dropped; what could stand in the place of what stays is told.
 
-use crate::choice::{Choice, Comparison, FULL, Poorer, TAKEN, TRIAL, is_given};
+use crate::choice::{Choice, Comparison, FULL, Poorer, SURE, TAKEN, TRIAL, is_given};
 use crate::fit::{Fit, cost, normal};
 use crate::interval::Spread;
 use crate::kinds::Kind;
@@ -102,9 +102,6 @@ fn needless_pair(
     }
     None
 }
-
-/// From so many nats on, by the linearised loss of a kind, it is kept without a fit that lacks it.
-const SURE: f64 = 40.0;
 
 /// What a fit loses without some of its parameters, to second order.
 struct Missing {

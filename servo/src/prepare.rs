@@ -246,7 +246,7 @@ fn ranges(sizes: &Sizes, dt: f64) -> Ranges {
     set(Param::StribeckVelocity, 0.01 * sizes.speed, sizes.top, 0.3 * sizes.speed);
     set(Param::Load, 0.0, 0.9, 0.2);
     set(Param::LoadRise, 0.0, 0.9, 0.2);
-    set(Param::Creep, 0.0, sizes.speed, 0.1 * sizes.speed);
+    set(Param::Creep, 0.0, sizes.top, 0.1 * sizes.speed);
     set(Param::Bias, -sizes.peak, sizes.peak, w);
     set(Param::Offset, -0.5, 0.5, 0.05);
     // A set point may arrive before the sample that it is logged with, up to a sample.

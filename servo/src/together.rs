@@ -8,7 +8,7 @@ use crate::arm::simulate_arm;
 use crate::choose::Chosen;
 use crate::law::Law;
 use crate::prepare::Joint;
-use crate::weigh::{least, tracking};
+use crate::weigh::{least, least_tried, tracking};
 use gapscope_dynamics::Model;
 use rayon::prelude::*;
 
@@ -46,7 +46,8 @@ pub fn is_missed(joints: &[Joint], with: (&Model, &[Option<Law>]), without: (&Mo
     let perfect: Vec<f64> = joints.iter().map(|joint| tracking(joint).max(1e-300)).collect();
     // Each joint by its own tracking error, so that a wrist counts as much as a shoulder.
     let of = |squares: &[f64]| squares.iter().zip(&perfect).map(|(square, perfect)| square / perfect).sum::<f64>();
-    of(&poor) - of(&rich) > least(of(&rich), joints.len() as f64)
+    // Much of what it does the joints' kinds did before: what they leave of it is little beside perfect tracking's error.
+    of(&poor) - of(&rich) > least_tried(of(&rich))
 }
 
 /// Laws of all joints; a joint without one stands still or is the bare model's.

@@ -141,7 +141,8 @@ impl Whole {
         matches!(self, Whole::Offset(_))
     }
 
-    /// Whether the logs tell what makes it what it is: a body has a mass, as a moment alone is what a bias or a zero is to one joint.
+    /// Whether its numbers alone tell what makes it what it is: a body has a mass, as a moment alone is what a bias or a zero is to one
+    /// joint.
     pub(crate) fn is_told(self, values: &[f64], covariance: &DMatrix<f64>) -> bool {
         self != Whole::Payload || 0.5 * values[0].powi(2) / covariance[(0, 0)].max(1e-300) >= TAKEN
     }

@@ -14,6 +14,18 @@ const ARM: &str = r#"<robot name="two"><link name="base"/>
 <joint name="b" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 0.12"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="5" velocity="9"/></joint>
 </robot>"#;
 
+/// A drive given for the first joint.
+const ONE: &str = "dead_band = 0\n[joint.a]\nstiffness = 3\ndamping = 0.18\n";
+
+/// The first joint of the arm alone.
+fn one() -> Model {
+    let start = ARM.find("<link name=\"lower\">").unwrap();
+    let end = ARM.find("<joint name=\"a\"").unwrap();
+    let last = ARM.find("<joint name=\"b\"").unwrap();
+    let text = format!("{}{}</robot>", &ARM[..start], &ARM[end..last]);
+    Model::from_urdf(&text).unwrap().model
+}
+
 /// A step of a 12-bit encoder, rad.
 const TICK: f64 = std::f64::consts::TAU / 4096.0;
 
@@ -139,6 +151,22 @@ fn friction_under_which_a_joint_creeps_is_told_with_the_speed_of_it() {
     // The law of the corrected arm creeps as well.
     let mut all = joints(&model, &logs(&model, [6.0, 3.0], |_| {}), &Given::default());
     assert!(read.laws(&mut all).unwrap().iter().all(|law| (law[Param::Creep] / 0.05 - 1.0).abs() < 0.2));
+}
+
+/// Where a joint creeps as fast as it moves, its friction is nearly what its drive's damping is.
+#[test]
+fn friction_that_creeps_as_fast_as_a_joint_moves_is_told_from_its_damping() {
+    let model = model();
+    let logs = of_each(&model, &[6.0, 3.0], |j, law| {
+        if j == 0 {
+            law[Param::Coulomb] = 0.15;
+            law[Param::Creep] = 1.0;
+        }
+    });
+    let (_, outcome) = kinds(&model, &logs);
+    assert_eq!(told(&outcome.diagnosis), [("coulomb_friction", &["a".to_owned()][..])]);
+    let coulomb = of(&outcome.diagnosis, "coulomb_friction", "coulomb", "a");
+    assert!((coulomb / (0.15 * 6.0) - 1.0).abs() < 0.1, "{coulomb}");
 }
 
 /// A turntable that carries nothing, its derivative gain on the error: in a law that brakes by its own speed alone, this friction
@@ -282,6 +310,48 @@ fn a_body_at_the_flange_is_found_against_a_given_servo() {
     // The corrected arm carries it to other logs.
     let (evaluation, _) = evaluate(&model, &logs, &given, Some(&outcome.corrected)).unwrap();
     assert!(evaluation.shrink.unwrap().position.shrink.unwrap() > 0.9);
+}
+
+/// What friction does to a joint that follows slow set points a dead band does as well.
+#[test]
+fn a_wide_dead_band_is_told_from_friction() {
+    let model = one();
+    let logs = of_each(&model, &[3.0], |_, law| law[Param::DeadBand] = 0.05);
+    let given = Given::from_toml(ONE, &["a".to_owned()]).unwrap();
+    let diagnosis = diagnose(&model, &logs, &given, Vec::new(), &|_, _| {}).unwrap().diagnosis;
+    assert_eq!(told(&diagnosis), [("dead_band", &["a".to_owned()][..])]);
+    let width = of(&diagnosis, "dead_band", "width", "a");
+    assert!((width / 0.05 - 1.0).abs() < 0.1, "{width}");
+}
+
+/// What is found of a joint alone that carries a body of 80 g, has a bias, and pushes no harder than at this error, rad.
+fn of_one_with_a_body(stiffness: f64, limit: f64) -> gapscope_servo::schema::Diagnosis {
+    let model = one();
+    let body = Effect::Payload(Payload { joint: "a".into(), mass: 0.08, com: [-0.05, 0.05, 0.11], inertia: [0.0; 6] });
+    let loaded = Plant::new(&model, std::slice::from_ref(&body), 1e-3).unwrap().model().clone();
+    let logs = of_each(&loaded, &[stiffness], |_, law| (law[Param::Bias], law[Param::Limit]) = (0.03, limit));
+    let text = format!("[joint.a]\nstiffness = 3\ndamping = {}\n", 0.06 * stiffness);
+    let given = Given::from_toml(&text, &["a".to_owned()]).unwrap();
+    diagnose(&model, &logs, &given, Vec::new(), &|_, _| {}).unwrap().diagnosis
+}
+
+/// A joint alone tells a body's moment and what it turns by, its mass by little.
+#[test]
+fn a_body_on_a_single_joint_is_found_beside_another_gain_a_bias_and_a_limit() {
+    let diagnosis = of_one_with_a_body(2.2, 0.4);
+    let mut kinds: Vec<&str> = diagnosis.effects.iter().map(|effect| effect.kind.as_str()).collect();
+    kinds.sort_unstable();
+    assert_eq!(kinds, ["payload", "servo_gain_error", "torque_bias", "torque_saturation"]);
+    let Some(Parameter::Single(mass)) = diagnosis.effects[0].parameters.get("mass") else { panic!("a mass") };
+    assert!((mass.value / 0.08 - 1.0).abs() < 0.1, "{mass:?}");
+}
+
+/// Held against what lasts before anybody looks for a body, no kind of the joint stands, and without them no body shows.
+#[test]
+fn a_body_on_a_single_joint_is_looked_for_before_its_kinds_are_held_against_what_lasts() {
+    let diagnosis = of_one_with_a_body(2.5, 10.0);
+    assert!(diagnosis.effects.iter().any(|effect| effect.kind == "payload"), "{:?}", diagnosis.effects);
+    assert_eq!(diagnosis.verdict, "explained");
 }
 
 /// What is found of a real arm under servos that are given as they are.

@@ -1,6 +1,7 @@
 //! What joints have while effects of the whole arm are looked for: their laws, and what of them is free.
 
-use crate::choose::Chosen;
+use crate::choose::{Chosen, From};
+use crate::fit::Fit;
 use crate::kinds::Kind;
 use crate::law::{Law, Param};
 use crate::prepare::Joint;
@@ -46,4 +47,14 @@ pub(crate) fn without(chosen: &[Option<Chosen>], joints: &[Joint], goes: impl Fn
         Some(account)
     };
     chosen.iter().zip(joints).enumerate().map(one).collect()
+}
+
+/// Where choices begin beside these fits: at the kinds that joints were found to have, as far as they are free there.
+pub(crate) fn beginnings(chosen: &[Option<Chosen>], fits: &[Option<Fit>]) -> Vec<From> {
+    let one = |(own, fit): (&Option<Chosen>, &Option<Fit>)| {
+        let (Some(own), Some(fit)) = (own, fit) else { return From::Nothing };
+        let is_free = |kind: &Kind| kind.parameters().iter().all(|(param, _, _)| fit.free.contains(param));
+        From::Account(fit.law, own.kinds.iter().map(|own| own.0).filter(is_free).collect())
+    };
+    chosen.iter().zip(fits).map(one).collect()
 }

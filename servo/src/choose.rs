@@ -90,12 +90,18 @@ fn begin(joint: &mut Joint, bar: Bar) -> (Choice<'_>, Vec<Kind>, Vec<Kind>) {
 }
 
 impl Choice<'_> {
-    /// The law of next to nothing, or the numbers of another for the same parameters, where a fit comes nearer from these.
-    fn nearer(&self, law: &Law, kinds: &[Kind]) -> Law {
-        let mut near = self.bare;
-        self.free(kinds).into_iter().for_each(|param| near[param] = law[param]);
-        let [bare, near] = [self.bare, near].map(|law| self.fit(&law, kinds, None, TRIAL));
-        if near.cost < bare.cost { near.law } else { bare.law }
+    /// The law where a choice of the usual `kinds` begins: next to nothing, or an account beside them, where that misses less; its
+    /// kinds join them.
+    fn nearer(&self, law: &Law, own: &[Kind], kinds: &mut Vec<Kind>) -> Law {
+        let more = own.iter().filter(|kind| !kinds.contains(kind));
+        let all: Vec<Kind> = kinds.iter().chain(more).copied().collect();
+        let bare = self.fit(&self.bare, kinds, None, TRIAL);
+        let near = self.fit(law, &all, None, TRIAL);
+        if near.cost >= bare.cost {
+            return bare.law;
+        }
+        *kinds = all;
+        near.law
     }
 }
 
@@ -105,23 +111,26 @@ pub enum From {
     /// At nothing.
     #[default]
     Nothing,
-    /// At nothing, or at the numbers of this law, where they miss less.
-    Near(Law),
+    /// At nothing, or at an account that was found in near surroundings, with what most servos have beside it: where less is missed.
+    Near(Law, Vec<Kind>),
     /// At an account that was found before, in other surroundings.
     Account(Law, Vec<Kind>),
 }
 
 impl From {
-    /// At nothing, or near a law where there is one.
-    pub fn near(law: &Option<Law>) -> From {
-        law.map_or(From::Nothing, From::Near)
+    /// At nothing too, where it begins at an account.
+    pub fn or_nothing(self) -> From {
+        match self {
+            From::Account(law, kinds) => From::Near(law, kinds),
+            other => other,
+        }
     }
 
     /// Its law, where it has one.
     pub fn law(&self) -> Option<Law> {
         match self {
             From::Nothing => None,
-            From::Near(law) | From::Account(law, _) => Some(*law),
+            From::Near(law, _) | From::Account(law, _) => Some(*law),
         }
     }
 }
@@ -165,7 +174,7 @@ fn choose_by_all(joint: &mut Joint, from: &From, bar: Bar) -> Chosen {
     let mut why = Vec::new();
     let start = match from {
         From::Nothing => choice.bare,
-        From::Near(law) => choice.nearer(law, &kinds),
+        From::Near(law, own) => choice.nearer(law, own, &mut kinds),
         From::Account(law, own) => {
             kinds.clone_from(own);
             *law

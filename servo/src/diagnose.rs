@@ -80,7 +80,7 @@ pub fn diagnose(
     progress("what the whole arm has", 0.5);
     // The search goes by what was measured: an arm without the effect moves otherwise than the one that has it.
     let moved = motions(model, &all, &vec![None; all.len()], episodes);
-    let (mut wholes, rivals) = find_wholes(model, &moved, &mut all, &mut chosen);
+    let (mut wholes, mut rivals) = find_wholes(model, &moved, &mut all, &mut chosen);
     let mut real = with(model, &wholes).unwrap_or_else(|| model.clone());
     for pass in 0..PASSES {
         // What jolts between samples did is no spring: the free run of the arm, which has those jolts, says so first. Of a link that
@@ -102,19 +102,27 @@ pub fn diagnose(
         };
         let laws: Vec<Option<Law>> = chosen.iter().zip(&rigid).map(|own| begin(own).law()).collect();
         let had = !wholes.is_empty();
-        real = settle(model, &mut all, &mut chosen, &mut wholes, &laws, episodes).unwrap_or(real);
+        let settled = settle(model, &mut all, &mut chosen, &mut wholes, &laws, episodes);
         // What joints have beside an effect of the whole arm was found beside its first numbers.
-        let anew = |from: From| if had { From::near(&from.law()) } else { from };
+        let anew = |from: From| if had { from.or_nothing() } else { from };
         let accounts: Vec<From> = chosen.iter().zip(&rigid).map(|own| anew(begin(own))).collect();
         let stay: Vec<bool> =
             chosen.iter().map(|own| pass > 0 && own.as_ref().is_some_and(|own| own.fit.law.winds_up())).collect();
         choose_anew(&mut all, &accounts, &stay, &mut chosen);
+        let Some((there, moved)) = settled else { continue };
+        real = there;
+        // By what joints jolt each other with between samples they may have kinds in the place of a body: it is looked for once more
+        // beside jolts as their models have them.
+        if pass == 0 && wholes.is_empty() && all.len() > 1 {
+            (wholes, rivals) = find_wholes(model, &moved, &mut all, &mut chosen);
+            real = with(model, &wholes).unwrap_or(real);
+        }
     }
     drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
     progress("the numbers of the arm and its joints, by finer steps", 0.85);
     let laws = laws_of(&chosen);
     if !laws.iter().flatten().any(Law::winds_up) {
-        real = settle(model, &mut all, &mut chosen, &mut wholes, &laws, episodes).unwrap_or(real);
+        real = settle(model, &mut all, &mut chosen, &mut wholes, &laws, episodes).map_or(real, |(there, _)| there);
     }
     let coarse = laws_of(&chosen);
     sharpen(&mut all, &mut chosen);
@@ -278,10 +286,11 @@ fn find_wholes(
         let before = laws_of(chosen);
         let there = if next.whole.is_zero() { Some(real.clone()) } else { with(&real, std::slice::from_ref(&next)) };
         let Some(there) = there else { return (found, looked.ties) };
-        if !is_missed(joints, (&there, &next.laws), (&real, &before)) {
+        let laws: Vec<Option<Law>> = next.beside.iter().map(From::law).collect();
+        if !is_missed(joints, (&there, &laws), (&real, &before)) {
             return (found, looked.ties);
         }
-        let laws = next.laws.clone();
+        let near: Vec<From> = next.beside.iter().cloned().map(From::or_nothing).collect();
         real = there;
         taken.push(next.whole);
         match next.whole {
@@ -290,13 +299,12 @@ fn find_wholes(
             _ => found.push(next),
         }
         surround(joints, &real, &moved);
-        let near: Vec<From> = laws.iter().map(From::near).collect();
         *chosen = choose_all(joints, &near);
     }
 }
 
 /// Effects of the whole arm and encoder zeros anew, in a motion that has the joints' jolts, by `laws`: those measured are smoothed.
-/// Leaves the joints in the surroundings of the arm that has them; that arm.
+/// Leaves the joints in the surroundings of the arm that has them; that arm, and its motion.
 fn settle(
     model: &Model,
     joints: &mut [Joint],
@@ -304,7 +312,7 @@ fn settle(
     wholes: &mut Vec<Found>,
     laws: &[Option<Law>],
     episodes: &[Episode],
-) -> Option<Model> {
+) -> Option<(Model, Vec<Motion>)> {
     let mut real = with(model, wholes)?;
     let mut moved = motions(&real, joints, laws, episodes);
     let refined = excerpt::with_arm(joints, &moved, |joints, moved| refine(model, moved, joints, chosen, wholes));
@@ -321,7 +329,7 @@ fn settle(
         }
     }
     surround(joints, &real, &moved);
-    Some(real)
+    Some((real, moved))
 }
 
 /// The model with effects of the whole arm; `None` where they are no body's.

@@ -263,7 +263,8 @@ impl Kind {
             Kind::Viscous => &[Kind::DampingError],
             Kind::DampingError => &[Kind::Viscous],
             Kind::Elasticity => &[Kind::Backlash],
-            Kind::Backlash => &[Kind::Elasticity],
+            // On teeth as soft as a log shows them a link swings as under a drive that brakes less.
+            Kind::Backlash => &[Kind::Elasticity, Kind::DampingError],
             Kind::Saturation => &[Kind::SpeedLimit],
             Kind::SpeedLimit => &[Kind::Saturation],
             _ => &[],

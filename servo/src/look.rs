@@ -1,6 +1,6 @@
 //! The search for effects of the whole arm: what they are worth beside what its joints were found to have, and in its place.
 
-use crate::account::{Account, Accounts, accounts, without};
+use crate::account::{Account, Accounts, accounts, beginnings, without};
 use crate::around::Motion;
 use crate::choice::{BEYOND, SURE, TAKEN};
 use crate::choose::{Chosen, restore};
@@ -46,7 +46,7 @@ pub fn look(
         }
         let tried = [beside, instead].into_iter().flatten();
         let Some(best) = tried.max_by(|a, b| a.nats.total_cmp(&b.nats)) else { continue };
-        let claim = before.claim(whole, &search, best, joints);
+        let claim = before.claim(whole, &search, best, joints, chosen);
         let claim = claim.filter(|own| outcome.found.as_ref().is_none_or(|found| own.nats > found.nats));
         outcome.found = claim.or(outcome.found);
     }
@@ -178,7 +178,14 @@ impl<'a> Before<'a> {
     }
 
     /// What may be claimed of an attempt.
-    fn claim(&self, whole: Whole, search: &Search, own: Attempt, joints: &[Joint]) -> Option<Found> {
+    fn claim(
+        &self,
+        whole: Whole,
+        search: &Search,
+        own: Attempt,
+        joints: &[Joint],
+        chosen: &[Option<Chosen>],
+    ) -> Option<Found> {
         let Attempt { settled, nats, saved, .. } = own;
         let falls = |j: usize| {
             let (rich, poor) = (settled.fits[j].as_ref()?, self.poor.1[j].as_ref()?);
@@ -196,9 +203,10 @@ impl<'a> Before<'a> {
         if nats <= TAKEN || !is_relevant || !search.is_possible(&settled.values) {
             return None;
         }
-        let (covariance, laws) = (search.covariance(&settled), settled.laws());
+        let covariance = search.covariance(&settled);
         let is_told = nats > SURE || whole.is_told(&settled.values, &covariance);
-        is_told.then_some(Found { whole, values: settled.values, covariance, nats, share, laws })
+        let beside = beginnings(chosen, &settled.fits);
+        is_told.then_some(Found { whole, values: settled.values, covariance, nats, share, beside })
     }
 }
 

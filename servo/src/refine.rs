@@ -78,7 +78,7 @@ pub fn refine(
 fn zero((j, own): (usize, &Option<Chosen>)) -> Option<Found> {
     let own = own.as_ref().filter(|own| own.kinds.iter().any(|(kind, _)| *kind == Kind::Offset))?;
     let (values, covariance) = (vec![own.fit.law[Param::Offset]], DMatrix::zeros(1, 1));
-    Some(Found { whole: Whole::Offset(j), values, covariance, nats: 0.0, share: 0.0, laws: Vec::new() })
+    Some(Found { whole: Whole::Offset(j), values, covariance, nats: 0.0, share: 0.0, beside: Vec::new() })
 }
 
 /// A search for the numbers of effects all at once.

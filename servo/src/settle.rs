@@ -8,7 +8,7 @@ use crate::around::Motion;
 use crate::choice::Projector;
 use crate::fit::{Fit, dot, fit};
 use crate::interval::{late, more_by_what_lasts, scatter};
-use crate::law::{Law, Param};
+use crate::law::Param;
 use crate::prepare::Joint;
 use crate::simulate::errors;
 use crate::weigh::independent;
@@ -88,10 +88,6 @@ impl Settled {
         let values = DVector::from_iterator(numbers.len(), numbers.iter().map(|&i| self.values[i]));
         let own = covariance.select_rows(numbers).select_columns(numbers);
         own.lu().solve(&values).map_or(f64::INFINITY, |x| 0.5 * values.dot(&x))
-    }
-
-    pub(crate) fn laws(&self) -> Vec<Option<Law>> {
-        self.fits.iter().map(|fit| fit.as_ref().map(|fit| fit.law)).collect()
     }
 }
 

@@ -4,8 +4,8 @@
 
 use crate::around::{Motion, surroundings};
 use crate::choice::TAKEN;
+use crate::choose::From;
 use crate::kinds::Kind;
-use crate::law::Law;
 use crate::prepare::Joint;
 use crate::run::{Around as Row, Surroundings};
 use gapscope_dynamics::Model;
@@ -51,8 +51,8 @@ pub struct Found {
     pub nats: f64,
     /// Share of the squared error that it takes away where it takes most.
     pub share: f64,
-    /// The joints' laws beside it, as it was found first.
-    pub laws: Vec<Option<Law>>,
+    /// The joints' accounts beside it, as it was found first.
+    pub beside: Vec<From>,
 }
 
 impl Whole {

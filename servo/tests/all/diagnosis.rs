@@ -354,6 +354,38 @@ fn a_body_on_a_single_joint_is_looked_for_before_its_kinds_are_held_against_what
     assert_eq!(diagnosis.verdict, "explained");
 }
 
+/// What is found of an arm that carries 50 g under drives that brake a third as much as given, and answer so late, s, as is given to
+/// be none.
+fn of_an_arm_that_swings(latency: f64) -> gapscope_servo::schema::Diagnosis {
+    let model = model();
+    let body = Effect::Payload(Payload { joint: "b".into(), mass: 0.05, com: [-0.03, 0.015, 0.1], inertia: [0.0; 6] });
+    let loaded = Plant::new(&model, std::slice::from_ref(&body), 1e-3).unwrap().model().clone();
+    let logs = logs(&loaded, [6.0, 3.0], |law| (law[Param::Damping], law[Param::Latency]) = (0.02, latency));
+    let text = "latency = 0\n[joint.a]\nstiffness = 6\ndamping = 0.36\n[joint.b]\nstiffness = 3\ndamping = 0.18\n";
+    let given = Given::from_toml(text, &["a".to_owned(), "b".to_owned()]).unwrap();
+    diagnose(&model, &logs, &given, Vec::new(), &|_, _| {}).unwrap().diagnosis
+}
+
+/// Joints that swing jolt each other: beside what was measured of these jolts, an offset or a play took the place of the body.
+#[test]
+fn a_body_is_found_where_joints_jolt_each_other() {
+    let both = ["a".to_owned(), "b".to_owned()];
+    let diagnosis = of_an_arm_that_swings(0.0);
+    assert_eq!(told(&diagnosis), [("payload", &both[1..]), ("servo_damping_error", &both[..])]);
+    let Some(Parameter::Single(mass)) = diagnosis.effects[0].parameters.get("mass") else { panic!("a mass") };
+    assert!((mass.value / 0.05 - 1.0).abs() < 0.02, "{mass:?}");
+}
+
+/// What joints have was found beside a body: chosen anew from nothing on they had a play again.
+#[test]
+fn what_joints_have_beside_a_body_is_where_a_choice_begins() {
+    let both = ["a".to_owned(), "b".to_owned()];
+    let told = of_an_arm_that_swings(0.034);
+    let kinds: Vec<&str> = told.effects.iter().map(|effect| effect.kind.as_str()).collect();
+    assert_eq!(kinds, ["payload", "servo_damping_error", "actuation_delay"]);
+    assert!(told.effects[1..].iter().all(|effect| effect.joints == both));
+}
+
 /// What is found of a real arm under servos that are given as they are.
 fn against_given(model: &Model, real: &Model, effects: impl Fn(usize, &mut Law)) -> gapscope_servo::Outcome {
     let text = "[joint.a]\nstiffness = 6\ndamping = 0.36\n[joint.b]\nstiffness = 3\ndamping = 0.18\n";

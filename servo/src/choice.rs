@@ -140,7 +140,8 @@ impl Choice<'_> {
         for &start in starts {
             places.extend(new.map_or(&[false][..], Kind::sides).iter().map(|&side| (*law, start, side)));
             // What friction stood in for is not felt beside that friction.
-            places.extend(new.filter(|kind| kind.hides()).map(|_| (self.bare, start, false)));
+            let alone = |kind: Kind| (kind.on_its_base(self.bare, start, &self.joint.ranges.scale), start, false);
+            places.extend(new.filter(|kind| kind.hides()).map(alone));
         }
         let mut fits: Vec<Fit> = places.into_iter().map(from).collect();
         fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));

@@ -172,16 +172,20 @@ impl Kind {
             }
             return;
         }
-        // What stands on a kind is felt where that kind is.
-        for &(param, _, _) in self.base().iter().flat_map(|base| base.parameters()) {
-            law[param] = law[param].max(start * scale[param as usize]);
-        }
         let starts = |param: Param| self.is_threshold() || !given[param as usize];
         for &(param, _, _) in self.parameters().iter().filter(|(param, _, _)| starts(*param)) {
             if !matches!(param, Param::Armature | Param::Contact) || self == Kind::Armature {
                 law[param] = start * scale[param as usize];
             }
         }
+    }
+
+    /// The law with the kind that it stands on at so many times its scale: it is felt where that one is.
+    pub fn on_its_base(self, mut law: Law, start: f64, scale: &[f64; PARAMS]) -> Law {
+        for &(param, _, _) in self.base().iter().flat_map(|base| base.parameters()) {
+            law[param] = start * scale[param as usize];
+        }
+        law
     }
 
     /// Takes it out of a law; `base` is the law without any kind, `others` are those that stay.

@@ -76,12 +76,18 @@ pub fn diagnose(
     let excited = all.iter().any(|joint| joint.moved);
     progress("what drives each joint", 0.1);
     let nothing = vec![From::Nothing; all.len()];
+    let single = (all.len() == 1).then(|| all.clone());
     let mut chosen = choose_all(&mut all, &nothing);
     progress("what the whole arm has", 0.5);
     // The search goes by what was measured: an arm without the effect moves otherwise than the one that has it.
     let moved = motions(model, &all, &vec![None; all.len()], episodes);
     let (mut wholes, mut rivals) = find_wholes(model, &moved, &mut all, &mut chosen);
     let mut real = with(model, &wholes).unwrap_or_else(|| model.clone());
+    // One joint alone that carries nothing is held against what lasts at once, by weights of its own: nobody looks for more.
+    if let Some(single) = single.filter(|_| wholes.is_empty()) {
+        all = single;
+        choose_anew(&mut all, &nothing, &[false], &mut chosen);
+    }
     for pass in 0..PASSES {
         // What jolts between samples did is no spring: the free run of the arm, which has those jolts, says so first. Of a link that
         // turns apart from its motor the encoder shows one side, and what the log corrects of it is not told from what its motor
@@ -90,7 +96,7 @@ pub fn diagnose(
         let rigid: Vec<From> = chosen.iter().map(|own| own.as_ref().map_or(From::Nothing, Chosen::rigid)).collect();
         drop_what_the_arm_does_not_miss(&real, &all, &mut chosen);
         // One joint alone feels no other's motion.
-        if all.len() == 1 && wholes.is_empty() && pass > 0 {
+        if all.len() == 1 && wholes.is_empty() {
             break;
         }
         // Once more, in surroundings by what was found of the others.

@@ -111,7 +111,7 @@ pub(crate) struct Choice<'a> {
 }
 
 impl Choice<'_> {
-    pub(crate) fn free(&self, kinds: &[Kind]) -> Vec<Param> {
+    fn free(&self, kinds: &[Kind]) -> Vec<Param> {
         let mut free = self.base.clone();
         for (param, _, _) in kinds.iter().flat_map(|kind| kind.parameters()) {
             if !free.contains(param) {

@@ -40,13 +40,13 @@ pub fn look(
     for whole in candidates(chosen).into_iter().filter(|whole| !found.contains(whole)) {
         let Some(search) = Search::new(&[whole], model, &before.turned, &before.fits, true) else { continue };
         let beside = before.beside(whole, &search, joints);
-        let instead = before.instead(whole, &search, joints, chosen);
+        let instead = before.instead(whole, &search, joints);
         if instead.as_ref().is_some_and(|own| before.ties(whole, own)) {
             outcome.ties.push(whole);
         }
         let tried = [beside, instead].into_iter().flatten();
         let Some(best) = tried.max_by(|a, b| a.nats.total_cmp(&b.nats)) else { continue };
-        let claim = before.claim(whole, &search, best, joints, chosen);
+        let claim = before.claim(whole, &search, best, joints);
         let claim = claim.filter(|own| outcome.found.as_ref().is_none_or(|found| own.nats > found.nats));
         outcome.found = claim.or(outcome.found);
     }
@@ -63,7 +63,8 @@ struct Before<'a> {
     turned: Vec<Motion>,
     /// Surroundings of the arm that moved so.
     plain: Around,
-    /// What the joints were found to have, and the same without what such an effect calls up.
+    /// What the joints were found to have, its laws, and the same without what such an effect calls up.
+    chosen: &'a [Option<Chosen>],
     accounts: Accounts,
     without_load: Accounts,
     /// Whether there is anything of that kind.
@@ -90,7 +91,7 @@ impl<'a> Before<'a> {
         model: &'a Model,
         motions: &'a [Motion],
         joints: &mut [Joint],
-        chosen: &[Option<Chosen>],
+        chosen: &'a [Option<Chosen>],
         found: &[Whole],
     ) -> Before<'a> {
         let accounts = accounts(chosen);
@@ -120,7 +121,7 @@ impl<'a> Before<'a> {
             }
             put(joints, &plain);
         }
-        Before { model, motions, turned, plain, accounts, without_load, calls_up, fits, poor, perfect }
+        Before { model, motions, turned, plain, chosen, accounts, without_load, calls_up, fits, poor, perfect }
     }
 
     fn attempt(&self, whole: Whole, settled: Settled, accounts: Accounts, joints: &[Joint]) -> Attempt {
@@ -143,13 +144,7 @@ impl<'a> Before<'a> {
     }
 
     /// The effect in the place of what it may have called up at the joints; what is missed beside it comes back.
-    fn instead(
-        &self,
-        whole: Whole,
-        search: &Search,
-        joints: &mut [Joint],
-        chosen: &[Option<Chosen>],
-    ) -> Option<Attempt> {
+    fn instead(&self, whole: Whole, search: &Search, joints: &mut [Joint]) -> Option<Attempt> {
         if !self.calls_up {
             return None;
         }
@@ -163,7 +158,7 @@ impl<'a> Before<'a> {
             return None;
         }
         put(joints, &search.around(&alone.values)?);
-        let accounts = restored(joints, chosen, &alone.fits);
+        let accounts = restored(joints, self.chosen, &alone.fits);
         let settled = search.settle(joints, &accounts, &alone.values).unwrap_or(alone);
         Some(self.attempt(whole, settled, accounts, joints))
     }
@@ -178,14 +173,7 @@ impl<'a> Before<'a> {
     }
 
     /// What may be claimed of an attempt.
-    fn claim(
-        &self,
-        whole: Whole,
-        search: &Search,
-        own: Attempt,
-        joints: &[Joint],
-        chosen: &[Option<Chosen>],
-    ) -> Option<Found> {
+    fn claim(&self, whole: Whole, search: &Search, own: Attempt, joints: &[Joint]) -> Option<Found> {
         let Attempt { settled, nats, saved, .. } = own;
         let falls = |j: usize| {
             let (rich, poor) = (settled.fits[j].as_ref()?, self.poor.1[j].as_ref()?);
@@ -205,7 +193,7 @@ impl<'a> Before<'a> {
         }
         let covariance = search.covariance(&settled);
         let is_told = nats > SURE || whole.is_told(&settled.values, &covariance);
-        let beside = beginnings(chosen, &settled.fits);
+        let beside = beginnings(self.chosen, &settled.fits);
         is_told.then_some(Found { whole, values: settled.values, covariance, nats, share, beside })
     }
 }

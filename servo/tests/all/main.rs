@@ -5,3 +5,4 @@
 mod clocks;
 mod diagnosis;
 mod experiment;
+mod whole;

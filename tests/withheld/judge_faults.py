@@ -3,8 +3,9 @@
     python tests/withheld/judge_faults.py target/release/gapscope BANK... [--beside 2]
 
 Faults are found before any effect is looked for, so that this takes a second a case and no diagnosis. BANK is made by
-`gapscope withheld make --faulty` or by `faulty.py`. Named: nothing but the fault is said, with its joints and its log.
-Sized: within 2 %, 5 ms or .02 rad. Silent: neither a fault nor a question. Needs no package.
+`gapscope withheld make --faulty` or by `faulty.py`. Named: nothing but the fault is said, with its joints and its log,
+or it is said to look the same as the one that is (a twin). Sized: within 2 %, 5 ms or .02 rad. Silent: neither a fault nor a
+question. Needs no package.
 """
 import argparse, collections, json, math, pathlib, subprocess
 from concurrent.futures import ThreadPoolExecutor
@@ -31,6 +32,8 @@ def judged(sealed, said):
     of_log = lambda fault: not files or fault["files"] == files
     if "error" in said: return "error"
     if not faults: return "asked" if said["doubts"] else "silent"
+    twins = [(twin["kind"], set(twin["joints"])) for fault in faults for twin in fault.get("indistinguishable_from", [])]
+    if len(faults) == 1 and (kind, set(sealed["joints"])) in twins and all(map(of_log, faults)): return "named, as a twin"
     if not all(map(same, faults)): return "other"
     if joints != set(sealed["joints"]) or not all(map(of_log, faults)): return "part"
     sizes = [fault["factor"] for fault in faults if fault.get("factor") is not None and sealed["factor"] is not None]
@@ -55,8 +58,9 @@ def main():
         word = judged(sealed, said); counts[word] += 1
         of_kind = kinds.setdefault(sealed["kind"], [0, 0]); of_kind[0] += word.startswith("named"); of_kind[1] += 1
         if word != "named": print(f"{case}: {word}: {sealed['kind']} of {', '.join(sealed['joints'])} {sealed['factor']} log {sealed['log']}: said {told}")
-    total = sum(counts.values()); named = counts["named"] + counts["named, size off"]
-    print(f"{total} faulty: named {named} ({named / max(total, 1):.2f}), of these sized {counts['named']} ({counts['named'] / max(named, 1):.2f}); " + ", ".join(f"{word} {counts[word]}" for word in ("part", "other", "asked", "silent", "error")))
+    total, twins = sum(counts.values()), counts["named, as a twin"]
+    own = counts["named"] + counts["named, size off"]; named = own + twins
+    print(f"{total} faulty: named {named} ({named / max(total, 1):.2f}), {twins} as a twin, of the others sized {counts['named']} ({counts['named'] / max(own, 1):.2f}); " + ", ".join(f"{word} {counts[word]}" for word in ("part", "other", "asked", "silent", "error")))
     print(f"{healthy['all']} healthy: a fault {healthy['a fault']}, mended {healthy['mended']}, a question {healthy['a question']}")
     print(", ".join(f"{kind} {a}/{b}" for kind, (a, b) in sorted(kinds.items())))
 

@@ -4,7 +4,7 @@ use crate::answer::Answer;
 use crate::fault::SealedFault;
 use crate::statistics::rounded;
 use crate::truth::Truth;
-use gapscope_datasets::{Fault, FaultKind};
+use gapscope_datasets::{Fault, FaultKind, Twin};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -96,10 +96,16 @@ pub(crate) fn fault_totals(all: &[FaultJudgement]) -> Option<FaultTotals> {
 }
 
 impl SealedFault {
-    /// Whether all that is said is of this kind, of these joints together, and of this log. `name` names a log.
+    /// Whether all that is said is of this kind, of these joints together, and of this log; or the one thing that is said is
+    /// said to look the same. `name` names a log.
     pub fn is_named(&self, said: &[Fault], name: impl Fn(usize) -> String) -> bool {
         let joints: BTreeSet<&String> = said.iter().flat_map(|fault| &fault.joints).collect();
         let of_log = |fault: &Fault| self.log.is_none_or(|log| fault.files == [name(log)]);
+        if let [fault] = said
+            && self.is_twin_of(fault)
+        {
+            return of_log(fault);
+        }
         let of_kind = |fault: &Fault| {
             // A velocity that is turned has a kind of its own.
             let turned = (FaultKind::VelocitySign, FaultKind::VelocityScale) == (fault.kind, self.kind);
@@ -110,8 +116,20 @@ impl SealedFault {
             && joints == self.joints.iter().collect()
     }
 
-    /// Whether every size that is said is the right one.
+    /// Whether a fault is said to look the same as this one.
+    fn is_twin_of(&self, fault: &Fault) -> bool {
+        let joints: BTreeSet<&String> = self.joints.iter().collect();
+        let same = |twin: &Twin| twin.kind == self.kind && twin.joints.iter().collect::<BTreeSet<_>>() == joints;
+        fault.indistinguishable_from.iter().any(same)
+    }
+
+    /// Whether every size that is said is the right one. The mend of what looks the same undoes this one.
     pub fn is_sized(&self, said: &[Fault]) -> bool {
+        if let [fault] = said
+            && self.is_twin_of(fault)
+        {
+            return true;
+        }
         let near = |said: f64, wanted: f64| match self.kind {
             FaultKind::TimeShift => (said - wanted).abs() < SHIFT,
             FaultKind::PositionZero => {

@@ -1,5 +1,6 @@
 //! What is wrong with the effort by itself: not recorded, noise, without its sign, cut off, in another unit, late.
 
+use super::decide::scales_cost;
 use super::sample::Sample;
 use super::weigh::{Freedom, Weighed, spread, weigh, weigh_either};
 use crate::check::{Fit, Logs, fit};
@@ -8,11 +9,14 @@ use gapscope_dynamics::Model;
 
 /// A gain between these is an effect, not a fault.
 pub(crate) const GAINS: (f64, f64) = (0.67, 1.5);
-/// A gain between these is as logged at first sight.
-const PLAIN: (f64, f64) = (0.6, 1.7);
+/// A gain between these is as logged at first sight, and one that is negative besides has lost its sign alone.
+pub(crate) const PLAIN: (f64, f64) = (0.6, 1.7);
 
 /// Dry friction of the wrong sign explains at least this part of what the model leaves of the effort, squared.
 const DRIVES: f64 = 0.5;
+
+/// A joint bears no weight where that is less than this part of its torque, squared.
+const WEIGHTLESS: f64 = 0.05;
 
 /// A unit that no other is near is that unit within this, as a logarithm.
 const ALONE: f64 = 0.18;
@@ -22,6 +26,9 @@ const FAR: f64 = 4.0;
 
 /// A rotor may take up to so many times the torque that the description does.
 const ROTOR: f64 = 6.0;
+
+/// Noise is loud at this many times that of the other joints.
+const LOUD: f64 = 10.0;
 
 /// An effort without its sign turns at zero, this part of its size, again and again: it comes from this part so many times. One
 /// that keeps its sign because of a weight turns at zero by chance alone.
@@ -44,7 +51,7 @@ pub(crate) enum Useless {
 ///
 /// Of a joint that hardly bears anything, noise may be all that there is to log: it counts beside a joint that bears more.
 pub(crate) fn useless_joints(logs: &Logs, e: usize, torque: &[Vec<f64>]) -> Vec<(usize, Useless)> {
-    let noise: Vec<Option<Noise>> = (0..torque.len()).map(|j| noise(logs, e, j, &torque[j])).collect();
+    let noise: Vec<Option<Noise>> = (0..torque.len()).map(|j| noise(logs, e, j, spread(&torque[j]))).collect();
     let any = noise.iter().flatten().any(|noise| *noise == Noise::Shows);
     let of = |(j, noise): (usize, &Option<Noise>)| match noise {
         Some(Noise::Never(value)) => Some((j, Useless::Constant(*value))),
@@ -65,7 +72,12 @@ enum Noise {
     MayBe,
 }
 
-fn noise(logs: &Logs, e: usize, j: usize, torque: &[f64]) -> Option<Noise> {
+/// Whether the effort of a joint in one log is noise, where it should spread by `taken`, (N m)² or N².
+pub(crate) fn follows_nothing(logs: &Logs, e: usize, j: usize, taken: f64) -> bool {
+    noise(logs, e, j, taken) == Some(Noise::Shows)
+}
+
+fn noise(logs: &Logs, e: usize, j: usize, taken: f64) -> Option<Noise> {
     let (episode, traits) = (logs.episodes[e], &logs.traits[e][j]);
     let effort = &episode.effort[j];
     if !traits.moves() || episode.effort_unknown.contains(&j) {
@@ -85,11 +97,28 @@ fn noise(logs: &Logs, e: usize, j: usize, torque: &[f64]) -> Option<Noise> {
     if with_next.abs() > 0.15 * variance || rms(&means).powi(2) > 2.0 * variance / block as f64 || means.len() < 9 {
         return None;
     }
-    let taken = spread(torque);
     let limit = logs.model.joints()[j].limits.effort.filter(|limit| *limit > 0.0).unwrap_or(f64::INFINITY);
-    let shows = taken > variance / block as f64 || variance.sqrt() > 0.2 * limit;
+    // Torque that the noise should not hide, or noise that no drive has.
+    let should_show = variance > taken && (taken > variance / block as f64 || variance.sqrt() > 0.2 * limit);
+    let shows = should_show || is_loud(logs, e, j, variance.sqrt());
     let absent = rms(&means).powi(2) < 0.3 * taken + 1.5 * variance / block as f64;
-    Some(if shows && absent && variance > taken { Noise::Shows } else { Noise::MayBe })
+    Some(if shows && absent { Noise::Shows } else { Noise::MayBe })
+}
+
+/// Whether noise of this size, N m or N, is far beyond that of the other joints, each held against the limit of its drive: the
+/// drives of one robot are measured alike.
+fn is_loud(logs: &Logs, e: usize, j: usize, size: f64) -> bool {
+    let limit = |i: usize| logs.model.joints()[i].limits.effort.filter(|limit| *limit > 0.0);
+    let of = |i: usize| Some(from_sample_to_sample(&logs.episodes[e].effort[i]) / limit(i)?);
+    let mut others: Vec<f64> = (0..logs.model.dof()).filter(|i| *i != j).filter_map(of).filter(|x| *x > 0.0).collect();
+    let Some((middle, limit)) = crate::robust::median(&mut others).zip(limit(j)) else { return false };
+    size > LOUD * middle * limit
+}
+
+/// Standard deviation of what a signal does from sample to sample beside going on as it went: of its second differences over √6.
+fn from_sample_to_sample(x: &[f64]) -> f64 {
+    let bends: Vec<f64> = x.windows(3).map(|three| three[0] - 2.0 * three[1] + three[2]).collect();
+    rms(&bends) / 6f64.sqrt()
 }
 
 /// Whether a joint whose effort is zero throughout is driven by nothing: then what the motion takes by the model is far
@@ -111,7 +140,16 @@ pub(crate) fn absolute_joints(
 ) -> Vec<(usize, Vec<usize>)> {
     let all = || 0..logs.episodes.len();
     let effort = |e: usize, j: usize| logs.episodes[e].effort[j].as_slice();
-    let turns = |e: usize, j: usize| if is_folded(effort(e, j)) { turns_at_zero(effort(e, j)) } else { 0 };
+    // Where no log has the other sign, turns of all logs count.
+    let together = |j: usize| {
+        let one_sided = all().all(|e| is_one_sided(effort(e, j)));
+        if one_sided { all().map(|e| turns_at_zero(effort(e, j))).sum() } else { 0 }
+    };
+    let together: Vec<usize> = (0..logs.model.dof()).map(together).collect();
+    let turns = |e: usize, j: usize| {
+        let own = if is_folded(effort(e, j)) { turns_at_zero(effort(e, j)) } else { 0 };
+        own.max(together[j])
+    };
     let by_model = |j: usize| all().all(|e| is_folded(effort(e, j))) && is_absolute(sample, torque, j);
     let clear: Vec<bool> = joints.iter().map(|&j| by_model(j)).collect();
     let told = |e: usize| clear.contains(&true) || joints.iter().any(|&j| turns(e, j) >= TURNS);
@@ -125,7 +163,7 @@ pub(crate) fn absolute_joints(
 }
 
 /// Whether an effort is never negative, or never positive.
-fn is_one_sided(effort: &[f64]) -> bool {
+pub(crate) fn is_one_sided(effort: &[f64]) -> bool {
     let (low, high) = effort.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     let size = high.abs().max(low.abs());
     size > 0.0 && (low >= -1e-3 * size || high <= 1e-3 * size)
@@ -185,6 +223,11 @@ pub(crate) fn friction_drives(sample: &Sample, torque: &[Vec<f64>], j: usize) ->
     with < 0.0 && with * with > DRIVES * left * dry
 }
 
+/// Whether what the model takes for a joint is inertia, and next to no weight.
+pub(crate) fn is_inertial(model: &Model, sample: &Sample, torque: &[Vec<f64>], j: usize) -> bool {
+    spread(&sample.weight(model)[j]) < WEIGHTLESS * spread(&torque[j])
+}
+
 /// What each joint's effort was multiplied by, at first sight: 1 where nothing speaks against it.
 pub(crate) fn first_scales(model: &Model, sample: &Sample, active: &[bool]) -> Vec<f64> {
     let torque = sample.torque(model);
@@ -216,7 +259,7 @@ pub(crate) fn first_scales(model: &Model, sample: &Sample, active: &[bool]) -> V
     if let [_] = accounts.as_slice() {
         return accounts.remove(0);
     }
-    let score = |scales: &Vec<f64>| weigh_either(model, sample, scales, active).score;
+    let score = |scales: &Vec<f64>| weigh_either(model, sample, scales, active).score - scales_cost(scales, active);
     let scored = accounts.into_iter().map(|scales| (score(&scales), scales));
     scored.max_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(|| vec![1.0; active.len()], |(_, scales)| scales)
 }
@@ -244,16 +287,14 @@ pub(crate) fn is_far(scale: f64) -> bool {
 fn common(told: &[Option<f64>], active: &[bool]) -> Option<Vec<f64>> {
     let telling: Vec<f64> = told.iter().flatten().copied().collect();
     let asked: Vec<f64> = telling.iter().copied().filter(|scale| *scale != 1.0).collect();
-    if asked.len() < 2
-        || 2 * asked.len() <= telling.len()
-        || asked.iter().any(|s| *s < 0.0) != asked.iter().all(|s| *s < 0.0)
-    {
+    if asked.len() < 2 || 2 * asked.len() <= telling.len() {
         return None;
     }
-    let mut logs: Vec<f64> = asked.iter().map(|s| s.abs().ln()).collect();
+    let sign = asked.iter().map(|s| s.signum()).sum::<f64>().signum();
+    let mut logs: Vec<f64> = asked.iter().filter(|s| **s * sign > 0.0).map(|s| s.abs().ln()).collect();
     let middle = crate::robust::median(&mut logs)?;
     let alike = logs.iter().filter(|s| (*s - middle).abs() < 0.5).count();
-    let scale = asked[0].signum() * middle.exp();
+    let scale = sign * middle.exp();
     (5 * alike >= 4 * asked.len()).then(|| active.iter().map(|active| if *active { scale } else { 1.0 }).collect())
 }
 
@@ -338,6 +379,23 @@ mod tests {
             friction_drives(&sample, &torque, 0)
         };
         assert!(!driven(1.0) && driven(-1.0));
+    }
+
+    #[test]
+    fn a_unit_that_most_joints_ask_for_is_that_of_all() {
+        let told = [112.8, 107.0, 119.2, 117.3, 120.2, 154.3, -587.1].map(Some);
+        let one = common(&told, &[true; 7]).unwrap();
+        assert!(one.iter().all(|scale| *scale == one[0]) && (100.0..130.0).contains(&one[0]), "{one:?}");
+        let halved = [112.8, 107.0, 119.2, -117.3, -120.2, -154.3].map(Some);
+        assert_eq!(common(&halved, &[true; 6]), None);
+    }
+
+    #[test]
+    fn what_changes_from_sample_to_sample_is_noise_and_not_motion() {
+        let wave = |k: i32| (0.01 * f64::from(k)).sin();
+        let noise = |k: i32| if (7.7 * f64::from(k * k)).sin() > 0.0 { 0.02 } else { -0.02 };
+        let size = from_sample_to_sample(&(0..4000).map(|k| wave(k) + noise(k)).collect::<Vec<f64>>());
+        assert!((size / 0.02 - 1.0).abs() < 0.1, "{size}");
     }
 
     #[test]

@@ -56,6 +56,7 @@ mod tests {
             evidence: format!("the clock runs {factor} times as fast: the model then leaves 1 %"),
             mend: String::new(),
             mended: true,
+            indistinguishable_from: Vec::new(),
             changes: vec![Change::Clock(1.0 / factor)],
             gravity: None,
         }

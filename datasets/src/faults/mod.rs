@@ -91,6 +91,9 @@ pub struct Fault {
     /// zero, rad or m, as logged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub factor: Option<f64>,
+    /// Other faults that would look the same: no log of this robot tells them from this one, and this one's mend undoes them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub indistinguishable_from: Vec<Twin>,
     /// What says so, in words.
     pub evidence: String,
     /// What mends it, in words.
@@ -102,6 +105,15 @@ pub struct Fault {
     /// Gravity of the mended model, m/s².
     #[serde(skip)]
     gravity: Option<[f64; 3]>,
+}
+
+/// A fault that would look the same as another.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Twin {
+    /// What would be wrong.
+    pub kind: FaultKind,
+    /// Joints concerned, by name; empty where it concerns whole logs.
+    pub joints: Vec<String>,
 }
 
 /// Something that looks like a fault of the data and may be an effect all the same.
@@ -141,7 +153,8 @@ impl Fault {
         let mended = !changes.iter().any(|change| matches!(change, Change::NoEffort(_)));
         let mend = words::mend_words(kind, factor, mended);
         let joints = joints.iter().map(name).collect();
-        Fault { kind, joints, files, factor, evidence, mend, mended, changes, gravity: None }
+        let indistinguishable_from = Vec::new();
+        Fault { kind, joints, files, factor, indistinguishable_from, evidence, mend, mended, changes, gravity: None }
     }
 
     /// Whether nothing mends it but leaving out the effort of its joints.

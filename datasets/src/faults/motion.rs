@@ -1,5 +1,6 @@
 //! Accounts of what was done to the motion: units, signs and zeros of positions, the clock, gravity, the order of joints.
 
+use super::FaultKind;
 use super::change::Change;
 use super::order;
 use super::sample::Sample;
@@ -54,6 +55,21 @@ pub(crate) enum Kind {
     Gravity,
     /// Joints, positions or efforts under each other's names.
     Order,
+}
+
+impl Kind {
+    /// What is then wrong.
+    pub fn of_fault(self) -> FaultKind {
+        match self {
+            Kind::Scale => FaultKind::PositionScale,
+            Kind::Sign => FaultKind::PositionSign,
+            Kind::Axis => FaultKind::AxisSign,
+            Kind::Zero => FaultKind::PositionZero,
+            Kind::Clock => FaultKind::TimeScale,
+            Kind::Gravity => FaultKind::Gravity,
+            Kind::Order => FaultKind::JointOrder,
+        }
+    }
 }
 
 /// One account of the motion.

@@ -3,7 +3,7 @@
 use super::change::Change;
 use super::clipped::lies_at_its_ends;
 use super::decide::SURE;
-use super::effort::{GAINS, effort_unit};
+use super::effort::{GAINS, effort_unit, follows_nothing, is_one_sided};
 use super::odd::MOST_LOGS;
 use super::sample::Sample;
 use super::weigh::{Freedom, independent, spread, weigh};
@@ -18,6 +18,8 @@ const ALIKE: f64 = 0.9;
 const FAR: (f64, f64) = (0.5, 2.0);
 /// The effort of another log is right from this correlation with the prediction on.
 const GOES: f64 = 0.4;
+/// An effort follows nothing below this correlation.
+const NOTHING: f64 = 0.2;
 /// Beside an effort that clearly lost its sign, one is told by this correlation with the size, and by so many nats.
 const BESIDE: f64 = 0.5;
 const BESIDE_SURE: f64 = 6.0;
@@ -37,6 +39,8 @@ struct Beside {
     correlation: f64,
     /// The same with the size of what they predict, where the effort keeps its sign and they do not.
     folded: f64,
+    /// Variance of what they predict, (N m)² or N².
+    spread: f64,
     /// By how many nats the size of the prediction is likelier than the prediction itself, each at its best gain and bias.
     lost_sign: f64,
 }
@@ -55,7 +59,7 @@ pub(crate) fn odd_efforts(logs: &Logs, model: &Model, sample: &Sample, active: &
     let mut found: Vec<Fault> = Vec::new();
     for e in 0..count {
         let odd: Vec<(usize, FaultKind, Beside)> = (0..active.len())
-            .filter_map(|j| table[e][j].and_then(|one| wrong(one).map(|kind| (j, kind, one))))
+            .filter_map(|j| table[e][j].and_then(|one| wrong(logs, e, j, one).map(|kind| (j, kind, one))))
             .collect();
         // What is cut off is told by its ends.
         let odd: Vec<_> = odd.into_iter().filter(|(j, ..)| !lies_at_its_ends(&logs.episodes[e].effort[*j])).collect();
@@ -133,7 +137,7 @@ fn beside(effort: &[f64], predicted: &[f64]) -> Option<Beside> {
     let folded = if keeps { with(effort, &size) / (total * spread(&size).max(1e-300)).sqrt() } else { 0.0 };
     let left = |correlation: f64| (1.0 - correlation * correlation).max(FLOOR);
     let lost_sign = 0.5 * independent(effort.len()) * (left(correlation) / left(folded)).ln();
-    Some(Beside { gain: with(effort, predicted) / taken, correlation, folded, lost_sign })
+    Some(Beside { gain: with(effort, predicted) / taken, correlation, folded, spread: taken, lost_sign })
 }
 
 /// Whether the effort of another log is right, where one is odd: it goes with the prediction, at a gain far from the odd one's.
@@ -148,8 +152,10 @@ fn goes(one: Beside) -> bool {
 }
 
 /// What is wrong with an effort whose other logs are right.
-fn wrong(one: Beside) -> Option<FaultKind> {
-    if one.folded > ALIKE && one.lost_sign > SURE {
+fn wrong(logs: &Logs, e: usize, j: usize, one: Beside) -> Option<FaultKind> {
+    if one.correlation.abs() < NOTHING && follows_nothing(logs, e, j, one.spread) {
+        Some(FaultKind::EffortNoise)
+    } else if one.folded > ALIKE && one.lost_sign > SURE && is_one_sided(&logs.episodes[e].effort[j]) {
         Some(FaultKind::EffortAbsolute)
     } else if one.correlation.abs() < ALIKE || (FAR.0..FAR.1).contains(&one.gain) {
         None
@@ -167,6 +173,12 @@ fn fault(logs: &Logs, e: usize, j: usize, kind: FaultKind, one: Beside) -> Fault
         FaultKind::EffortAbsolute => {
             let evidence = format!(
                 "the effort of {name} keeps its sign, where the other logs have it change, and is like theirs in size"
+            );
+            (None, evidence, Change::NoEffort(j))
+        }
+        FaultKind::EffortNoise => {
+            let evidence = format!(
+                "the effort of {name} changes from sample to sample and does not follow what the other logs predict"
             );
             (None, evidence, Change::NoEffort(j))
         }

@@ -3,7 +3,7 @@
 use super::change::Change;
 use super::clipped::clipped;
 use super::decide::scales_cost;
-use super::effort::{GAINS, effort_unit, fine_scales, first_scales, friction_drives};
+use super::effort::{GAINS, PLAIN, effort_unit, fine_scales, first_scales, friction_drives, is_inertial};
 use super::sample::Sample;
 use super::weigh::{Freedom, spread, weigh, weigh_either};
 use super::{Doubt, Fault, FaultKind, figure};
@@ -43,7 +43,10 @@ pub(crate) fn scales(
         for j in (0..n).filter(|&j| scales[j] != 1.0).collect::<Vec<_>>() {
             let limit = model.joints()[j].limits.effort.filter(|limit| *limit > 0.0).unwrap_or(f64::INFINITY);
             let impossible = rms(&sample.effort[j]) > 1.2 * limit;
-            let own = varies[j] > WITNESS * most && (varies[j] > WITNESS * limit || limit == f64::INFINITY);
+            // No rotor makes an inertia less than described, and none is below zero.
+            let inertial = scales[j] < GAINS.0 && is_inertial(model, sample, &torque, j);
+            let of_limit = varies[j] > WITNESS * limit || limit == f64::INFINITY;
+            let own = varies[j] > WITNESS * most && (of_limit || inertial);
             // Of the sign friction is a witness too.
             let drives = scales[j] < 0.0 && friction_drives(sample, &torque, j);
             if alone_of(&scales, j) && !own && !impossible && !drives {
@@ -153,7 +156,7 @@ fn said(
         if let Some((_, factor)) = &unit {
             scale = factor * scale.signum();
         }
-        let turned = scale < 0.0 && (GAINS.0..GAINS.1).contains(&-scale);
+        let turned = scale < 0.0 && (PLAIN.0..PLAIN.1).contains(&-scale);
         if turned {
             scale = -1.0;
         } else if (GAINS.0..GAINS.1).contains(&scale) {

@@ -18,6 +18,8 @@ const GRAMS: f64 = 1e-3;
 const NEAR: f64 = 0.7;
 /// What is left of an effort, squared, is little below this.
 const LITTLE: f64 = 0.03;
+/// What two accounts leave of a joint, squared, is the same where it differs by less than this, as a logarithm.
+const SAME: f64 = 0.3;
 /// An autocorrelation below this is chance.
 const REMEMBERED: f64 = 0.05;
 /// Rounds of weighing the joints against each other.
@@ -94,6 +96,12 @@ impl Weighed {
         };
         let overcounted: f64 = (0..self.unexplained.len()).map(overcounted).sum();
         self.score - other.score - overcounted
+    }
+
+    /// Whether it leaves the same of every effort as another account, up to chance.
+    pub fn leaves_the_same(&self, other: &Weighed, active: &[bool]) -> bool {
+        let same = |j: usize| (self.unexplained[j] / other.unexplained[j]).ln().abs() < SAME;
+        (0..active.len()).all(|j| !active[j] || same(j))
     }
 
     /// Whether little of any effort is left.

@@ -92,6 +92,8 @@ pub struct Episode {
     pub joints: Vec<String>,
     /// Time stamps, s, strictly increasing, any origin.
     pub time: Vec<f64>,
+    /// Whether the stamps are taken at their word, though they may jitter where the samples were taken at a steady rate.
+    pub stamps_kept: bool,
     /// Measured position, rad or m.
     pub position: Samples,
     /// Measured velocity, rad/s or m/s.
@@ -206,6 +208,7 @@ impl Episode {
             name: name.into(),
             joints: self.joints.clone(),
             time: self.time[from..to].to_vec(),
+            stamps_kept: self.stamps_kept,
             effort_unknown: self.effort_unknown.clone(),
             ..Episode::default()
         };

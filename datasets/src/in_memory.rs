@@ -87,9 +87,10 @@ fn read_run(run: &Arrays, request: &Request) -> Result<(Vec<Episode>, Vec<Findin
     if !run.joints.is_empty() {
         held.push(Array::texts("joint_names", run.joints.clone()));
     }
-    let table = arrays::columns_or_whole(held, request)
+    let mut table = arrays::columns_or_whole(held, request)
         .and_then(|recording| recording.table(request))
         .map_err(|error| error.file(run.name.clone()))?;
+    table.episode.stamps_kept = request.options.keep_stamps;
     let (parts, notes) = time_stamps::split(table, &run.name);
     Ok((parts, notes.into_iter().map(|note| Finding::new(&run.name, note)).collect()))
 }

@@ -24,6 +24,8 @@ pub struct ReadOptions {
     /// Read logs in which joints have a command, current or voltage in the place of their effort; an empty cell of these
     /// then means that the quantity is not known there.
     pub without_effort: bool,
+    /// Take time stamps at their word, where they jitter and the samples were taken at a steady rate.
+    pub keep_stamps: bool,
     /// How much is taken in of all logs together; what exceeds it is left out evenly, with a finding. `None` for all.
     pub bound: Option<Bound>,
 }

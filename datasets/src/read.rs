@@ -123,7 +123,8 @@ impl File<'_> {
         let (mut kept, mut findings) = (Keeper::new(request.options.bound), Vec::new());
         (told.tell)(&format!("reading {}", self.name));
         let mut take = |run: Run| {
-            let table = run.table(request)?;
+            let mut table = run.table(request)?;
+            table.episode.stamps_kept = request.options.keep_stamps;
             let name = format!("{}{}", self.name, table.label);
             let (parts, notes) = time_stamps::split(table, &name);
             findings.extend(notes.into_iter().map(|note| Finding::new(&name, note)));

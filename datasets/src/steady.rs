@@ -20,10 +20,10 @@ const ON_CLOCK: f64 = 1e-6;
 
 impl Episode {
     /// Stamps on a steady clock, s, where the positions are smooth by that clock and not by the stamps; `None` where the
-    /// stamps are as good. A clock's steps may be missing.
+    /// stamps are as good, or to be kept. A clock's steps may be missing.
     pub(crate) fn steady_time(&self) -> Option<Vec<f64>> {
         let dt = self.dt();
-        if self.len() < READINGS || dt <= 0.0 {
+        if self.stamps_kept || self.len() < READINGS || dt <= 0.0 {
             return None;
         }
         let mut tick = 0.0;
@@ -131,6 +131,8 @@ mod tests {
         let taken = steady(false);
         assert_eq!(log(&taken, &taken, 1e-6).steady_time(), None);
         assert_eq!(log(&taken, &jittered(&taken, 2e-6), 1e-4).steady_time(), None);
+        let kept = Episode { stamps_kept: true, ..log(&taken, &jittered(&taken, 2e-4), 1e-6) };
+        assert_eq!(kept.steady_time(), None);
         // A clock that is half as fast in the second half.
         let two: Vec<f64> = taken.iter().map(|t| if *t > 3.0 { 2.0 * t - 3.0 } else { *t }).collect();
         assert_eq!(log(&taken, &two, 1e-6).steady_time(), None);

@@ -38,7 +38,7 @@ pub struct Input {
     /// Leave out logs that cannot be read instead of stopping
     #[arg(long)]
     pub skip_bad_logs: bool,
-    /// Take the logs as they are, where a wrong unit, sign, order, zero or clock was found
+    /// Take the logs as they are, where a wrong unit, sign, order, zero or clock was found, or where time stamps jitter
     #[arg(long)]
     pub as_logged: bool,
     /// Logs in memory, in the place of files; `logs` then holds their names
@@ -301,6 +301,7 @@ pub fn options(input: &Input) -> Result<ReadOptions> {
         // A hole in a channel that nothing here needs is worth a finding, not the log.
         drop_bad_channels: true,
         without_effort: false,
+        keep_stamps: input.as_logged,
         bound: None,
     })
 }

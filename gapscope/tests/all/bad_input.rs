@@ -89,6 +89,16 @@ fn another_unit_is_the_answer_and_as_logged_is_no_confident_one() {
     }
 }
 
+#[test]
+fn stamps_that_jitter_are_steadied_but_as_logged() {
+    let dir = pendulum();
+    // A fifth of the step of 5 ms, to and fro.
+    let late = |k: usize| 1e-3 * (7.7 * (k * k) as f64).sin();
+    spoil(dir.path(), |name, k, x| if name == "time" { x + late(k) } else { x });
+    let steadied = |more: &str| diagnosed(dir.path(), more).1["data"].to_string().contains("sampled at a steady rate");
+    assert!(steadied("") && !steadied(" --as-logged"));
+}
+
 /// Leaves the header and so many rows of `log.csv` in `short.csv`.
 fn shorten(folder: &Path, rows: usize) {
     let text = std::fs::read_to_string(folder.join("log.csv")).unwrap();

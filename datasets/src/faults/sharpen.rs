@@ -23,6 +23,8 @@ const WITHIN: f64 = 0.1;
 const MET: f64 = 5.0;
 /// By how many nats gravity in the opposite direction may fit worse than what lies beside it.
 const OPPOSITE: f64 = 4.0;
+/// A robot stands upright, hangs or is on a wall where its gravity is this near to an axis of its base, rad.
+const UPRIGHT: f64 = 5.0 * std::f64::consts::PI / 180.0;
 /// A unit with a name that limits ask for is that unit within a factor of two.
 const UNTOLD: f64 = std::f64::consts::LN_2;
 
@@ -51,8 +53,9 @@ impl Decision<'_> {
                     _ => step *= 0.4,
                 }
             }
-            // The opposite direction is the one that is met.
-            let found = if at(-own).0 > best.0 - OPPOSITE { -own } else { best.1 };
+            // The opposite direction is the one that is met, and so are the axes of the base: on a wall, on a table.
+            let met = if at(-own).0 > best.0 - OPPOSITE { Some(-own) } else { upright(best.1) };
+            let found = met.unwrap_or(best.1);
             return Account { gravity: Some(found), value: found.length() / own.length(), ..account };
         }
         let add = match account.kind {
@@ -146,7 +149,32 @@ impl Decision<'_> {
     }
 }
 
+/// Gravity along the axis of the base that it is nearest to, where a robot was mounted so: what is left of the tilt is an effect.
+fn upright(gravity: DVec3) -> Option<DVec3> {
+    let size = gravity.length();
+    let axis = DVec3::AXES
+        .into_iter()
+        .flat_map(|axis| [axis, -axis])
+        .max_by(|a, b| gravity.dot(*a).total_cmp(&gravity.dot(*b)))?;
+    (size > 0.0 && gravity.angle_between(axis) < UPRIGHT).then_some(size * axis + DVec3::ZERO)
+}
+
 /// Speed measured over speed derived of one joint, in the first log that tells.
 fn slope_of(logs: &Logs, j: usize) -> Option<f64> {
     logs.relations.iter().find_map(|relations| relations[j]).filter(|one| one.correlation > 0.95).map(|one| one.slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gravity_near_an_axis_of_the_base_is_along_it() {
+        assert_eq!(
+            upright(DVec3::new(-9.78, 0.7, 0.3)),
+            Some(DVec3::new(-DVec3::new(-9.78, 0.7, 0.3).length(), 0.0, 0.0))
+        );
+        assert_eq!(upright(DVec3::new(-9.7, 1.4, 0.3)), None);
+        assert_eq!(upright(DVec3::ZERO), None);
+    }
 }

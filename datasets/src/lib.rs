@@ -56,7 +56,7 @@ pub use column_map::{ColumnMap, Source};
 pub use digest::digest;
 pub use episode::{Channel, Episode, Samples};
 pub use error::{LogError, LogErrorKind};
-pub use faults::{Doubt, Fault, FaultKind, Faults, Twin, determined, find_faults, mend};
+pub use faults::{Doubt, Fault, FaultKind, Faults, LEAST_SHIFT, Twin, determined, find_faults, mend};
 pub use generate::{GenerateError, Recipe, Robot, follow, generate, record};
 pub use in_memory::{Arrays, read_arrays};
 pub use inspect::{JointTraits, LogTraits, inspect, joints_of};

@@ -34,6 +34,10 @@ pub use determined::determined;
 use gapscope_dynamics::Model;
 use serde::{Deserialize, Serialize};
 
+/// Effort and position that are apart by less than this are an effect, s: the border is 20 ms, and a lag of that looks like a shift
+/// a little longer.
+pub const LEAST_SHIFT: f64 = 0.022;
+
 /// What is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -8,13 +8,11 @@ use super::sample::Sample;
 use super::shift::{Bar, Clocks};
 use super::units::CLOCKS;
 use super::weigh::{Freedom, Weighed, weigh};
-use super::{Doubt, Fault, FaultKind, Faults, channels, figure, odd, odd_effort, strange};
+use super::{Doubt, Fault, FaultKind, Faults, LEAST_SHIFT, channels, figure, odd, odd_effort, strange};
 use crate::check::{Logs, Seen};
 use crate::episode::Episode;
 use gapscope_dynamics::Model;
 
-/// Shifts below this are an effect, s: the border is 20 ms, and a lag of that looks like one a little longer.
-const SHIFT: f64 = 0.022;
 /// What the model says is wrong is beyond doubt where the mended logs leave less than this of the effort, squared.
 const SETTLED: f64 = 0.15;
 /// At most so many things are wrong with the motion.
@@ -342,7 +340,7 @@ impl Search {
 
     /// Effort and position of different instants.
     fn shift(&mut self, nothing_else: bool) {
-        let bar = Bar { least: SHIFT, sure: if self.alone { 2.0 * SURE } else { SURE }, nothing_else };
+        let bar = Bar { least: LEAST_SHIFT, sure: if self.alone { 2.0 * SURE } else { SURE }, nothing_else };
         match self.clocks(|clocks| clocks.shift(bar)) {
             Some(Ok(fault)) => self.take(fault),
             // Where something is asked already, a shift may be what that does.
@@ -353,7 +351,7 @@ impl Search {
 
     /// One log of several whose effort and position are of different instants.
     fn shift_of_one(&mut self) {
-        let bar = Bar { least: SHIFT, sure: 2.0 * SURE, nothing_else: false };
+        let bar = Bar { least: LEAST_SHIFT, sure: 2.0 * SURE, nothing_else: false };
         let found = self.clocks(|clocks| clocks.shift_of_one(bar));
         found.into_iter().for_each(|fault| self.take(fault));
     }

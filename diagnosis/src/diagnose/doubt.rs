@@ -2,13 +2,17 @@
 
 use crate::diagnose::Outcome;
 use crate::numbers::decide::LEAST_THERE;
-use crate::schema::{Change, Gap, Shrink, Verdict};
-use gapscope_datasets::{Doubt, Fault};
+use crate::schema::{Change, FoundEffect, Gap, Parameter, Quantity, Shrink, Verdict};
+use gapscope_datasets::{Doubt, Fault, FaultKind, LEAST_SHIFT};
+use gapscope_effects::Kind;
 
 impl Outcome {
     /// Enters what is wrong with the logs, and what may be: effects that would be the other explanation of a doubt are
     /// no more than possible, and such logs explain nothing. As logged, a fault that was not undone is a doubt about all.
-    pub fn under(&mut self, faults: Vec<Fault>, doubts: Vec<Doubt>) {
+    pub fn under(&mut self, faults: Vec<Fault>, mut doubts: Vec<Doubt>) {
+        if !faults.iter().any(|fault| fault.kind == FaultKind::TimeShift) {
+            doubts.extend(two_clocks(&self.diagnosis.effects));
+        }
         let as_logged = faults.iter().any(|fault| !fault.mended && !fault.leaves_joints_out());
         for effect in &mut self.diagnosis.effects {
             let other = |doubt: &Doubt| doubt.effects.is_empty() || doubt.effects.contains(&effect.kind);
@@ -31,6 +35,32 @@ impl Outcome {
     }
 }
 
+/// What is asked of a drive that acts later than an effect does, beyond doubt: effort and position may have had two clocks.
+fn two_clocks(effects: &[FoundEffect]) -> Option<Doubt> {
+    let least = |effect: &FoundEffect| {
+        let of = |parameter: &Parameter| match parameter {
+            Parameter::Single(one) => vec![one.ci95[0].clone()],
+            Parameter::PerJoint(all) => all.values().map(|one| one.ci95[0].clone()).collect(),
+        };
+        let number = |quantity: Quantity| match quantity {
+            Quantity::Scalar(value) => Some(value),
+            Quantity::Vector(_) => None,
+        };
+        effect.parameters.values().flat_map(of).filter_map(number).reduce(f64::max)
+    };
+    let late = effects.iter().filter(|effect| Kind::named(&effect.kind).is_some_and(|kind| kind.card().late.is_some()));
+    let longest = late.filter_map(least).reduce(f64::max).filter(|least| *least > LEAST_SHIFT)?;
+    Some(Doubt {
+        question: format!(
+            "have effort and position one clock? The effort is logged at least {:.0} ms before the motion that it makes, which is longer than drives take",
+            1e3 * longest
+        ),
+        joints: Vec::new(),
+        // A shift bends all that is told beside it.
+        effects: Vec::new(),
+    })
+}
+
 impl Gap {
     /// Takes out a joint whose effort is not known: of its torque no gap can be told, and no model can be rolled out.
     pub(crate) fn leave_out(&mut self, joint: &str) {
@@ -48,5 +78,33 @@ impl Shrink {
     pub(crate) fn leave_out_motion(&mut self) {
         self.one_step = Change { before: None, after: None, shrink: None, ci95: None };
         self.rollout.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::schema::{EffectShrink, Estimate, Part};
+
+    fn late(kind: &str, [low, high]: [f64; 2]) -> FoundEffect {
+        let ends = [low, high].map(Quantity::Scalar);
+        let one = Estimate { value: Quantity::Scalar(0.5 * (low + high)), ci95: ends, unit: "s".into() };
+        FoundEffect {
+            kind: kind.into(),
+            joints: vec![],
+            part: Part::Further,
+            confidence: 0.98,
+            parameters: [("delay".to_owned(), Parameter::Single(one))].into(),
+            indistinguishable_from: vec![],
+            shrink: EffectShrink { torque: None, ci95: None },
+        }
+    }
+
+    #[test]
+    fn a_drive_that_acts_later_than_drives_do_may_be_two_clocks() {
+        let asked = two_clocks(&[late("actuator_lag", [0.04, 0.05])]).unwrap();
+        assert!(asked.question.contains("40 ms") && asked.effects.is_empty(), "{asked:?}");
+        assert_eq!(two_clocks(&[late("actuator_lag", [0.01, 0.05])]), None);
+        assert_eq!(two_clocks(&[late("backlash", [0.04, 0.05])]), None);
     }
 }

@@ -25,8 +25,6 @@ const LIKELY: f64 = 8.0;
 const APART: f64 = 6.0;
 /// What an account costs by itself, in nats: units, zeros, clocks and orders are tried by the hundred.
 const COST: f64 = 5.0;
-/// What a scale of the effort costs beside an account of the motion, in nats: of mirror images, the one without.
-const SCALE_COST: f64 = 8.0;
 /// What a clock gains, in nats, by steps of time that no log has, or by velocities that are all off by its factor; and a unit by
 /// each joint that it brings back from far beyond its limits.
 const BESIDE: f64 = 30.0;
@@ -178,7 +176,7 @@ impl Decision<'_> {
     /// An account with whatever scale of the efforts suits it, and what those scales cost.
     pub fn weighed(&self, model: &Model, sample: &Sample, active: &[bool]) -> (Weighed, f64) {
         let scales = effort::first_scales(model, sample, active);
-        let cost = scales_cost(&scales, active);
+        let cost = effort::scales_cost(&scales, active);
         let plain = weigh_either(model, sample, &vec![1.0; scales.len()], active);
         if cost == 0.0 {
             return (plain, 0.0);
@@ -254,15 +252,6 @@ fn are_exchanged(joints: &[usize], logged: &[f64], own: &[f64], part: f64) -> bo
     let most = |part: f64| joints.iter().all(|&j| times(j) <= part || own[j] < NOTABLE);
     let each = telling().next().is_some() && telling().all(|j| times(j) <= part);
     each || mean <= 0.5 * part && most(2.0 * part) || mean <= 0.25 * part
-}
-
-/// What scales of the effort cost: one that all share as much as one alone.
-pub(crate) fn scales_cost(scales: &[f64], active: &[bool]) -> f64 {
-    let mut distinct: Vec<f64> =
-        scales.iter().zip(active).filter(|(s, active)| **active && **s != 1.0).map(|(s, _)| *s).collect();
-    distinct.sort_by(f64::total_cmp);
-    distinct.dedup();
-    SCALE_COST * distinct.len() as f64
 }
 
 /// What an account undoes, and with it the velocities that were logged in the same terms: they are the derivative of the

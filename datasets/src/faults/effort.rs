@@ -1,6 +1,5 @@
 //! What is wrong with the effort by itself: not recorded, noise, without its sign, cut off, in another unit, late.
 
-use super::decide::scales_cost;
 use super::sample::Sample;
 use super::weigh::{Freedom, Weighed, spread, weigh, weigh_either};
 use crate::check::{Fit, Logs, fit};
@@ -17,6 +16,9 @@ const DRIVES: f64 = 0.5;
 
 /// A joint bears no weight where that is less than this part of its torque, squared.
 const WEIGHTLESS: f64 = 0.05;
+
+/// What a scale of the effort costs beside an account of the motion, in nats: of mirror images, the one without.
+const SCALE_COST: f64 = 8.0;
 
 /// A unit that no other is near is that unit within this, as a logarithm.
 const ALONE: f64 = 0.18;
@@ -226,6 +228,15 @@ pub(crate) fn friction_drives(sample: &Sample, torque: &[Vec<f64>], j: usize) ->
 /// Whether what the model takes for a joint is inertia, and next to no weight.
 pub(crate) fn is_inertial(model: &Model, sample: &Sample, torque: &[Vec<f64>], j: usize) -> bool {
     spread(&sample.weight(model)[j]) < WEIGHTLESS * spread(&torque[j])
+}
+
+/// What scales of the effort cost: one that all share as much as one alone.
+pub(crate) fn scales_cost(scales: &[f64], active: &[bool]) -> f64 {
+    let mut distinct: Vec<f64> =
+        scales.iter().zip(active).filter(|(s, active)| **active && **s != 1.0).map(|(s, _)| *s).collect();
+    distinct.sort_by(f64::total_cmp);
+    distinct.dedup();
+    SCALE_COST * distinct.len() as f64
 }
 
 /// What each joint's effort was multiplied by, at first sight: 1 where nothing speaks against it.

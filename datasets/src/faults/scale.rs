@@ -2,8 +2,7 @@
 
 use super::change::Change;
 use super::clipped::clipped;
-use super::decide::scales_cost;
-use super::effort::{GAINS, PLAIN, effort_unit, fine_scales, first_scales, friction_drives, is_inertial};
+use super::effort::{GAINS, PLAIN, effort_unit, fine_scales, first_scales, friction_drives, is_inertial, scales_cost};
 use super::sample::Sample;
 use super::weigh::{Freedom, spread, weigh, weigh_either};
 use super::{Doubt, Fault, FaultKind, figure};

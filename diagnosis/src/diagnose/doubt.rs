@@ -4,14 +4,15 @@ use crate::diagnose::Outcome;
 use crate::numbers::decide::LEAST_THERE;
 use crate::schema::{Change, FoundEffect, Gap, Parameter, Quantity, Shrink, Verdict};
 use gapscope_datasets::{Doubt, Fault, FaultKind, LEAST_SHIFT};
-use gapscope_effects::Kind;
+use gapscope_effects::Effect;
 
 impl Outcome {
     /// Enters what is wrong with the logs, and what may be: effects that would be the other explanation of a doubt are
     /// no more than possible, and such logs explain nothing. As logged, a fault that was not undone is a doubt about all.
     pub fn under(&mut self, faults: Vec<Fault>, mut doubts: Vec<Doubt>) {
         if !faults.iter().any(|fault| fault.kind == FaultKind::TimeShift) {
-            doubts.extend(two_clocks(&self.diagnosis.effects));
+            let late = self.corrected.effects.iter().map(Effect::kind).filter(|kind| kind.card().late.is_some());
+            doubts.extend(two_clocks(&self.diagnosis.effects, &late.map(|kind| kind.name()).collect::<Vec<_>>()));
         }
         let as_logged = faults.iter().any(|fault| !fault.mended && !fault.leaves_joints_out());
         for effect in &mut self.diagnosis.effects {
@@ -35,8 +36,8 @@ impl Outcome {
     }
 }
 
-/// What is asked of a drive that acts later than an effect does, beyond doubt: effort and position may have had two clocks.
-fn two_clocks(effects: &[FoundEffect]) -> Option<Doubt> {
+/// What is asked of a drive that acts later than an effect does, beyond doubt, by its kinds that are `late`: effort and position may have had two clocks.
+fn two_clocks(effects: &[FoundEffect], late: &[&str]) -> Option<Doubt> {
     let least = |effect: &FoundEffect| {
         let of = |parameter: &Parameter| match parameter {
             Parameter::Single(one) => vec![one.ci95[0].clone()],
@@ -48,7 +49,7 @@ fn two_clocks(effects: &[FoundEffect]) -> Option<Doubt> {
         };
         effect.parameters.values().flat_map(of).filter_map(number).reduce(f64::max)
     };
-    let late = effects.iter().filter(|effect| Kind::named(&effect.kind).is_some_and(|kind| kind.card().late.is_some()));
+    let late = effects.iter().filter(|effect| late.contains(&effect.kind.as_str()));
     let longest = late.filter_map(least).reduce(f64::max).filter(|least| *least > LEAST_SHIFT)?;
     Some(Doubt {
         question: format!(
@@ -102,9 +103,10 @@ mod tests {
 
     #[test]
     fn a_drive_that_acts_later_than_drives_do_may_be_two_clocks() {
-        let asked = two_clocks(&[late("actuator_lag", [0.04, 0.05])]).unwrap();
+        let clocks = |effect: FoundEffect| two_clocks(&[effect], &["actuation_delay", "actuator_lag"]);
+        let asked = clocks(late("actuator_lag", [0.04, 0.05])).unwrap();
         assert!(asked.question.contains("40 ms") && asked.effects.is_empty(), "{asked:?}");
-        assert_eq!(two_clocks(&[late("actuator_lag", [0.01, 0.05])]), None);
-        assert_eq!(two_clocks(&[late("backlash", [0.04, 0.05])]), None);
+        assert_eq!(clocks(late("actuator_lag", [0.01, 0.05])), None);
+        assert_eq!(clocks(late("backlash", [0.04, 0.05])), None);
     }
 }

@@ -22,6 +22,7 @@ fn episode() -> Episode {
         effort_link: Some(channel(20)),
         temperature: Some(channel(1)),
         disturbance: Some(channel(0)),
+        stamps_kept: false,
         effort_unknown: Vec::new(),
         current: None,
         voltage: None,

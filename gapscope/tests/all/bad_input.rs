@@ -283,8 +283,9 @@ fn ctrl_c_ends_it_within_a_second_and_leaves_nothing() {
         .unwrap();
     std::thread::sleep(Duration::from_millis(500));
     assert!(child.try_wait().unwrap().is_none(), "it is done before it can be interrupted");
-    let start = Instant::now();
     assert!(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    // From the signal on: what it takes to start the command that sends it, on a busy machine, is not the tool's.
+    let start = Instant::now();
     let status = child.wait().unwrap();
     assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
     assert_eq!(status.signal(), Some(2), "{status:?}");

@@ -107,32 +107,25 @@ impl Decision<'_> {
             (false, true) => (LIKELY, EXPLAINS),
             (false, false) => (SURE, EXPLAINS),
         };
-        // A turned base and the zero or the sign of its first joint are one and the same.
-        let twins = |a: Kind, b: Kind| a == Kind::Gravity && matches!(b, Kind::Zero | Kind::Sign | Kind::Axis);
         let other = |other: &Account| other.kind != account.kind || other.joints != account.joints;
-        // So are two accounts as likely that leave the same of every joint: an axis turned round, and the zero of the next
-        // joint by half a turn.
-        let is_twin = |rival: &Account, by: &Weighed| {
-            twins(account.kind, rival.kind) || twins(rival.kind, account.kind) || by.leaves_the_same(weighed, active)
-        };
-        let as_likely = || best.iter().skip(1).filter(|(of, rival, _)| margin - of <= APART && other(rival));
-        let twin: Vec<&Account> =
-            as_likely().filter(|(_, rival, by)| is_twin(rival, by)).map(|(_, rival, _)| rival).collect();
-        let rival = as_likely().find(|(_, rival, by)| !is_twin(rival, by));
+        let as_likely = best.iter().skip(1).filter(|(of, rival, _)| margin - of <= APART && other(rival));
+        // Two that leave the same of every joint are one robot: a turned base and the zero of its first joint, an axis turned
+        // round and the zero of the next joint by half a turn.
+        let (twins, rivals): (Vec<_>, Vec<_>) = as_likely.partition(|(_, _, by)| by.leaves_the_same(weighed, active));
         // What an unknown spring beside friction could be as well is asked.
         let known = account.kind != Kind::Order
             || are_exchanged(&account.joints, &logged.0.unexplained, &weighed.unexplained, OWN);
-        if margin > sure && after < most && rival.is_none() && known {
+        if margin > sure && after < most && rivals.is_empty() && known {
             // A joint that was set otherwise is met more often than a robot that stands otherwise.
-            let of_joint = |of: &&Account| of.kind != Kind::Gravity;
-            let said = [account].into_iter().chain(twin.iter().copied()).find(of_joint).unwrap_or(account);
+            let same: Vec<&Account> = [account].into_iter().chain(twins.into_iter().map(|(_, twin, _)| twin)).collect();
+            let said = same.iter().position(|one| one.kind != Kind::Gravity).unwrap_or(0);
             // Within the border of an effect it is one, at its best size.
-            let sharp = self.sharpened(logs, sample, active, said.clone());
+            let sharp = self.sharpened(logs, sample, active, same[said].clone());
             if small(&sharp) {
                 return None;
             }
-            let same = [account].into_iter().chain(twin).filter(|one| !std::ptr::eq(*one, said));
-            let mut fault = self.fault(logs, &sharp, before, after).with_twins(logs, same);
+            let twins = same.iter().enumerate().filter(|(i, _)| *i != said).map(|(_, twin)| *twin);
+            let mut fault = self.fault(logs, &sharp, before, after).with_twins(logs, twins);
             if as_described {
                 fault.evidence += "; the robot is then as described, and would else be another";
             }
@@ -144,7 +137,7 @@ impl Decision<'_> {
             per_cent(after),
             per_cent(before)
         );
-        if let Some((_, other, _)) = rival {
+        if let Some((_, other, _)) = rivals.first() {
             question += &format!("; or {}", phrase(logs, other));
         }
         let joints = account.joints.iter().map(|&j| logs.model.joints()[j].name.clone()).collect();

@@ -21,8 +21,8 @@ const NEAR: f64 = 0.05;
 const WITHIN: f64 = 0.1;
 /// By how many nats degrees are likelier than any other unit before a log is looked at: they are met a hundred times as often.
 const MET: f64 = 5.0;
-/// By how many nats gravity in the opposite direction may fit worse than what lies beside it.
-const OPPOSITE: f64 = 4.0;
+/// By how many nats gravity along an axis of the base may fit worse than what lies beside it.
+const MET_TILT: f64 = 4.0;
 /// A robot stands upright, hangs or is on a wall where its gravity is this near to an axis of its base, rad.
 const UPRIGHT: f64 = 5.0 * std::f64::consts::PI / 180.0;
 /// A unit with a name that limits ask for is that unit within a factor of two.
@@ -53,9 +53,10 @@ impl Decision<'_> {
                     _ => step *= 0.4,
                 }
             }
-            // The opposite direction is the one that is met, and so are the axes of the base: on a wall, on a table.
-            let met = if at(-own).0 > best.0 - OPPOSITE { Some(-own) } else { upright(best.1) };
-            let found = met.unwrap_or(best.1);
+            // The axes of the base are the directions that are met: upside down, on a wall. What is left of the tilt is an effect.
+            let axis = axis_of(best.1);
+            let upright = best.1.angle_between(axis) < UPRIGHT || at(axis).0 > best.0 - MET_TILT;
+            let found = if size > 0.0 && upright { axis } else { best.1 };
             return Account { gravity: Some(found), value: found.length() / own.length(), ..account };
         }
         let add = match account.kind {
@@ -149,14 +150,12 @@ impl Decision<'_> {
     }
 }
 
-/// Gravity along the axis of the base that it is nearest to, where a robot was mounted so: what is left of the tilt is an effect.
-fn upright(gravity: DVec3) -> Option<DVec3> {
-    let size = gravity.length();
-    let axis = DVec3::AXES
-        .into_iter()
-        .flat_map(|axis| [axis, -axis])
-        .max_by(|a, b| gravity.dot(*a).total_cmp(&gravity.dot(*b)))?;
-    (size > 0.0 && gravity.angle_between(axis) < UPRIGHT).then_some(size * axis + DVec3::ZERO)
+/// Gravity of the same size along the axis of the base that it is nearest to.
+fn axis_of(gravity: DVec3) -> DVec3 {
+    let along = |axis: &DVec3| gravity.dot(*axis).abs();
+    let axis = DVec3::AXES.into_iter().max_by(|a, b| along(a).total_cmp(&along(b))).unwrap_or_default();
+    // Without the sign of a zero.
+    gravity.length() * gravity.dot(axis).signum() * axis + DVec3::ZERO
 }
 
 /// Speed measured over speed derived of one joint, in the first log that tells.
@@ -170,11 +169,11 @@ mod tests {
 
     #[test]
     fn a_gravity_near_an_axis_of_the_base_is_along_it() {
-        assert_eq!(
-            upright(DVec3::new(-9.78, 0.7, 0.3)),
-            Some(DVec3::new(-DVec3::new(-9.78, 0.7, 0.3).length(), 0.0, 0.0))
-        );
-        assert_eq!(upright(DVec3::new(-9.7, 1.4, 0.3)), None);
-        assert_eq!(upright(DVec3::ZERO), None);
+        let near = DVec3::new(-9.78, 0.7, 0.3);
+        assert_eq!(axis_of(near), DVec3::new(-near.length(), 0.0, 0.0));
+        assert!(near.angle_between(axis_of(near)) < UPRIGHT);
+        let tilted = DVec3::new(-9.7, 1.4, 0.3);
+        assert!(tilted.angle_between(axis_of(tilted)) > UPRIGHT);
+        assert_eq!(axis_of(DVec3::ZERO), DVec3::ZERO);
     }
 }

@@ -3,17 +3,15 @@
 use crate::diagnose::Outcome;
 use crate::numbers::decide::LEAST_THERE;
 use crate::schema::{Change, FoundEffect, Gap, Parameter, Quantity, Shrink, Verdict};
-use gapscope_datasets::{Doubt, Fault, FaultKind, LEAST_SHIFT};
+use gapscope_datasets::{Doubt, Fault, LEAST_SHIFT};
 use gapscope_effects::Effect;
 
 impl Outcome {
     /// Enters what is wrong with the logs, and what may be: effects that would be the other explanation of a doubt are
     /// no more than possible, and such logs explain nothing. As logged, a fault that was not undone is a doubt about all.
     pub fn under(&mut self, faults: Vec<Fault>, mut doubts: Vec<Doubt>) {
-        if !faults.iter().any(|fault| fault.kind == FaultKind::TimeShift) {
-            let late = self.corrected.effects.iter().map(Effect::kind).filter(|kind| kind.card().late.is_some());
-            doubts.extend(two_clocks(&self.diagnosis.effects, &late.map(|kind| kind.name()).collect::<Vec<_>>()));
-        }
+        let late = self.corrected.effects.iter().map(Effect::kind).filter(|kind| kind.card().late.is_some());
+        doubts.extend(two_clocks(&self.diagnosis.effects, &late.map(|kind| kind.name()).collect::<Vec<_>>()));
         let as_logged = faults.iter().any(|fault| !fault.mended && !fault.leaves_joints_out());
         for effect in &mut self.diagnosis.effects {
             let other = |doubt: &Doubt| doubt.effects.is_empty() || doubt.effects.contains(&effect.kind);

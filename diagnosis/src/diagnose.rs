@@ -149,7 +149,7 @@ impl Record<'_> {
         let beside = judged(&self.beside_outside(problem, &fit.set, &after.rows));
         let judged = judged(&after.rows);
         let unexplained = judged.unexplained_fraction();
-        let verdict = judged.verdict(effects.is_empty(), !problem.outside(&fit.set).is_empty());
+        let verdict = judged.verdict(effects.is_empty(), judged.concerned_by_laws(&beside));
         // What a law outside the catalogue accounts for does not speak against the effects beside it.
         let misfit = (verdict != Verdict::Explained).then_some(&beside);
         let found = self.found_effects(chosen, rivals, misfit, change)?;

@@ -90,7 +90,14 @@ impl Judged {
         (0..self.joints.len()).any(|j| self.alone(j))
     }
 
-    /// The answer in a word, by whether any effect was found, and whether a law outside the catalogue stands beside them.
+    /// Whether what laws outside the catalogue account for concerns anyone: a part of some joint's effort, `beside` with them taken
+    /// for known.
+    pub fn concerned_by_laws(&self, beside: &Judged) -> bool {
+        let takes = |(left, beside): (&Level, &Level)| left.after.powi(2) - beside.after.powi(2);
+        self.joints.iter().zip(&beside.joints).map(takes).any(|square| square > IMMATERIAL.get().powi(2))
+    }
+
+    /// The answer in a word, by whether any effect was found, and whether a law outside the catalogue concerns anyone beside them.
     pub fn verdict(&self, no_effects: bool, outside: bool) -> Verdict {
         match (no_effects, self.leaves_much()) {
             (true, false) => Verdict::NoGap,
@@ -127,6 +134,10 @@ mod tests {
         let alone = judged(one(3, 0.03), one(3, 0.03));
         assert_eq!(alone.verdict(true, false), Verdict::UnknownEffect);
         assert_eq!(judged([2e-3; 7], one(3, 2e-3)).verdict(true, false), Verdict::NoGap);
+        // A law outside the catalogue that accounts for all that this joint leaves concerns somebody; for less than that, nobody.
+        let faint = judged([1.0; 7], one(3, 9e-3));
+        let known = judged([1.0; 7], one(3, 1e-3));
+        assert!(spot.concerned_by_laws(&known) && !faint.concerned_by_laws(&known));
         // A spring swings with noise in the band: what its joint leaves is no measure.
         let spring = Judged { floored: (0..7).map(|j| j != 3).collect(), ..spot };
         assert_eq!(spring.verdict(false, false), Verdict::Explained);

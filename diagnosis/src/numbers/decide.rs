@@ -53,8 +53,7 @@ numbers! {
     PRICE_OF_OUTSIDE = 5.0, "nats";
 
     /// What an odd account must bring: some links off while others are right, where one may have been wrong in the URDF or
-    /// all are a little; a spring or play beside its rotor, on either side of the gear, the best of some hundred tries; what
-    /// hardly moves a joint, or comes where nothing is missed.
+    /// all are a little; what hardly moves a joint, or comes where nothing is missed.
     PRICE_OF_ODD = 20.0, "nats";
 
     // How well things are known.

@@ -2,7 +2,7 @@
 
 use crate::fit::estimate::Fit;
 use crate::fit::problem::Problem;
-use crate::numbers::decide::{PRICE_OF_ODD, TWENTY_TO_ONE};
+use crate::numbers::decide::TWENTY_TO_ONE;
 use crate::record::data::Data;
 use crate::record::logs::Record;
 use crate::search::climb;
@@ -45,6 +45,8 @@ pub(crate) struct Turned {
     pub place: usize,
     /// Spring or play, its knob known.
     pub drive: Candidate,
+    /// So many knobs, rotors and encoder sides of its kind were tried at its joint.
+    pub tries: usize,
     /// By how many nats the best account with a rigid drive is less likely.
     pub odds: f64,
     /// What stood beside it when it was found, each with its coefficients, and the alignment first: a refinement that begins with
@@ -71,8 +73,9 @@ impl Chosen {
 
     /// Log probability of the account before any log is seen.
     pub(crate) fn prior(&self) -> f64 {
-        let drive = if self.turns() { PRICE_OF_ODD.get() + (self.noise.len() as f64).ln() } else { 0.0 };
-        Competition::new(&self.all).prior(&self.choice.set) - drive
+        let drive = |turned: &Turned| TWENTY_TO_ONE.get() + ((turned.tries * self.noise.len()) as f64).ln();
+        let turned = self.turned.as_ref().filter(|_| self.turns());
+        Competition::new(&self.all).prior(&self.choice.set) - turned.map_or(0.0, drive)
     }
 
     /// The same with another choice among its candidates.

@@ -34,7 +34,9 @@ use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Rotors that are tried first with each, as parts of the inertia that they turn.
+/// Where the position may be logged.
+const SIDES: [EncoderSide; 2] = [EncoderSide::Link, EncoderSide::Motor];
+/// Rotors that are tried first with each knob, as parts of the inertia that they turn.
 const ROTOR: [f64; 7] = [0.1, 0.2, 0.33, 0.5, 0.7, 1.0, 1.4];
 /// The best so many of these pairs go on.
 const FIRST: usize = 3;
@@ -211,7 +213,7 @@ impl<'a> Study<'a> {
         let left_of = |e: usize| mean_square(&rest[self.logs.band.of_episode[e].clone()]);
         let episode = (0..self.runs.len()).max_by(|&a, &b| left_of(a).total_cmp(&left_of(b)));
         let first = self.rigid_in(View { episode, smooth: None });
-        let tried: Vec<(Kind, Turning, EncoderSide)> = [EncoderSide::Link, EncoderSide::Motor]
+        let tried: Vec<(Kind, Turning, EncoderSide)> = SIDES
             .into_iter()
             .flat_map(|side| turning().map(move |(kind, turning)| (kind, turning, side)))
             .filter(|(_, turning, side)| !self.through || turning.filtered == Some(*side))
@@ -346,6 +348,11 @@ impl<'a> Study<'a> {
         }
         (drive, rotor)
     }
+}
+
+/// Knobs with rotors that are tried of a kind at a joint, the encoder on either side.
+fn tries(kind: Kind) -> usize {
+    kind.card().turning.map_or(0, |turning| SIDES.len() * turning.first.len() * (ROTOR.len() + 1))
 }
 
 /// The columns of a joint's own calibration along a log, its rotor aside: friction and bias.

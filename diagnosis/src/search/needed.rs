@@ -50,7 +50,7 @@ impl Record<'_> {
             }
             let without = self.instead(&chosen, set.clone())?;
             let mut odds = chosen.odds_against(&without, self)?;
-            if odds <= 0.0 || !(kind.is_outside() || chosen.concerns_beside(&without)) {
+            if odds <= 0.0 || !chosen.concerns_beside(&without) {
                 chosen = without;
                 continue;
             }

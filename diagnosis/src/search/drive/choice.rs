@@ -10,7 +10,7 @@ use crate::search::chosen::{Chosen, Turned};
 use crate::search::climb;
 use crate::search::climb::Choice;
 use crate::search::converge::weighing;
-use crate::search::drive::Account;
+use crate::search::drive::{Account, tries};
 use crate::search::needed::DOUBTFUL;
 use gapscope_effects::{Candidate, EffectError, Force, Place};
 use rayon::prelude::*;
@@ -153,7 +153,8 @@ impl Record<'_> {
             let mut set = [rigid.choice.set.as_slice(), &[place]].concat();
             set.sort_unstable();
             set.dedup();
-            let turned = Turned { place, drive: account.drive, odds: 0.0, beside: Vec::new() };
+            let tries = tries(account.drive.kind);
+            let turned = Turned { place, drive: account.drive, tries, odds: 0.0, beside: Vec::new() };
             let (exact, fit) = self.data(&rigid.noise).exact(&all, &set, Some(&turned))?;
             let beside = Chosen { all, turned: Some(turned), ..rigid.with(Choice { set }, exact, fit) };
             let odds = beside.odds_against(rigid, self)?;

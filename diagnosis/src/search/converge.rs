@@ -9,6 +9,7 @@ use crate::record::logs::{Progress, Record};
 use crate::search::chosen::{Chosen, Turned};
 use crate::search::climb;
 use crate::search::climb::Choice;
+use crate::search::needed::DOUBTFUL;
 use gapscope_effects::{Candidate, EffectError, Kind};
 use std::sync::OnceLock;
 
@@ -16,7 +17,9 @@ use std::sync::OnceLock;
 const ROUNDS: usize = 4;
 
 /// Kinds of a set with their joints.
-type Places = Vec<(Kind, Vec<usize>)>;
+fn places(exact: &Problem) -> Vec<(Kind, &[usize])> {
+    exact.entries.iter().map(|e| (e.candidate.kind, e.candidate.joints.as_slice())).collect()
+}
 
 impl Record<'_> {
     /// From a set on a grid to the set at its exact parameters: refined, and chosen again around what was found.
@@ -29,34 +32,38 @@ impl Record<'_> {
         progress: Progress<'_>,
     ) -> Result<Chosen, EffectError> {
         let data = self.data(&noise);
+        let mut before: Option<(Chosen, f64)> = None;
         let mut round = 0;
-        let mut before: Option<(Places, f64)> = None;
-        let (exact, fit) = loop {
-            progress("refining effects", 0.3 + 0.08 * round as f64);
+        loop {
             round += 1;
+            progress("refining effects", 0.3 + 0.08 * (round - 1) as f64);
             let (exact, fit) = data.exact(&all, &choice.set, turned.as_ref())?;
-            // The same effects from other places of their grids came to the same parameters.
-            let places: Places = exact.entries.iter().map(|e| (e.candidate.kind, e.candidate.joints.clone())).collect();
-            let now = Some((places, exact.misfit(&fit, &self.band)));
-            let same = |(places, misfit): &(Places, f64)| {
-                now.as_ref().is_some_and(|(own, left)| own == places && misfit - left < SETTLED_MISFIT)
-            };
-            if round == ROUNDS || choice.set.is_empty() || before.as_ref().is_some_and(same) {
-                break (exact, fit);
+            let misfit = exact.misfit(&fit, &self.band);
+            let (late_doubt, tried, needed) = (None, Vec::new(), Vec::new());
+            let (noise, turned, rest) = (noise.clone(), turned.clone(), OnceLock::new());
+            let now = Chosen { all, choice, exact, fit, noise, turned, late_doubt, tried, needed, rest };
+            if let Some((before, left)) = before {
+                // A law that reads the torque found can seem to stand for all that was found, and is nothing by itself.
+                if misfit - left > DOUBTFUL && now.odds_against(&before, self)? < 0.0 {
+                    return Ok(before);
+                }
+                // The same effects from other places of their grids came to the same parameters.
+                if places(&before.exact) == places(&now.exact) && left - misfit < SETTLED_MISFIT {
+                    return Ok(now);
+                }
             }
-            before = now;
+            if round == ROUNDS || now.choice.set.is_empty() {
+                return Ok(now);
+            }
             // The choice again, around the parameters found.
-            self.around(&mut all, &choice, &exact, &fit, &noise)?;
-            let again = climb::choose(&mut all, &self.band, &choice.set);
-            let same = again.set == choice.set;
-            choice = again;
-            if same {
-                break (exact, fit);
+            all = now.all.clone();
+            self.around(&mut all, &now.choice, &now.exact, &now.fit, &now.noise)?;
+            choice = climb::choose(&mut all, &self.band, &now.choice.set);
+            if choice.set == now.choice.set {
+                return Ok(Chosen { all, ..now });
             }
-        };
-        let (late_doubt, tried, needed) = (None, Vec::new(), Vec::new());
-        let rest = OnceLock::new();
-        Ok(Chosen { all, choice, exact, fit, noise, turned, late_doubt, tried, needed, rest })
+            before = Some((now, misfit));
+        }
     }
 
     /// Puts all candidates around a set at its exact law: knobs turned, gears loaded, and what bends taken into account.

@@ -4,8 +4,9 @@ use gapscope_datasets::generate;
 use gapscope_diagnosis::schema::{Diagnosis, Verdict};
 use gapscope_dynamics::Model;
 use gapscope_effects::{Armature, CoulombFriction, Effect, JointCoupling, LoadDependentFriction, PreslidingFriction};
-use gapscope_tests::{diagnose, recipe, robot};
+use gapscope_tests::{diagnose, read_set, recipe, robot};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Values on the joints from the `first` on.
 fn on(model: &Model, first: usize, values: &[f64]) -> BTreeMap<String, f64> {
@@ -21,6 +22,18 @@ fn kinds(diagnosis: &Diagnosis) -> Vec<&str> {
     let mut kinds: Vec<&str> = diagnosis.effects.iter().map(|e| e.kind.as_str()).collect();
     kinds.sort_unstable();
     kinds
+}
+
+/// All that the fifth joint of this UR10, simulated by MuJoCo (`tests/withheld/used.py`, seed 34503, case 32, one log rounded), takes
+/// is a spring, friction and a rotor: a gain of its drive reads them, and is nothing without them.
+#[test]
+fn a_strong_spring_in_a_light_wrist_is_no_gain_of_its_drive() {
+    let (model, logs) = read_set(&Path::new(env!("CARGO_MANIFEST_DIR")).join("logs/light_wrist"), "episode");
+    let found = diagnose(&model, &logs).diagnosis;
+    let spring = found.effects.iter().find(|e| e.kind == "parallel_spring").unwrap();
+    assert!(spring.joints.contains(&"wrist_2_joint".to_owned()), "{spring:#?}");
+    let left = found.shrink.torque.after.unwrap();
+    assert!(left < 0.1, "{left} of the effort's spread, for .035");
 }
 
 /// The sixth joint carries next to nothing: its friction grows with what its rotor takes.

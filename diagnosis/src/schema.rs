@@ -308,7 +308,8 @@ pub struct Resemblance {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Lookalike {
     /// `link_drag` (of a medium, with the square of a link's speed), `joint_drag` (in a joint, faster than with its speed),
-    /// `swing` (a mass that swings on a link), `rub` and `catch` (dry friction, torque at some places of a joint's travel).
+    /// `swing` (a mass that swings on a link), `rub` and `catch` (dry friction, torque at some places of a joint's travel),
+    /// `nonlinear_spring` (a spring that stiffens).
     pub law: String,
     /// The joints, or those that move the links.
     pub joints: Vec<String>,

@@ -18,3 +18,4 @@ pub mod pushes;
 pub mod rivals;
 pub mod screen;
 pub mod sticking;
+pub mod unbent;

@@ -95,19 +95,22 @@ impl Candidate {
         }
     }
 
-    /// Laws outside the catalogue, those aside of which a first look leaves a few.
-    pub fn outside(model: &Model) -> Vec<Candidate> {
+    /// Laws outside the catalogue where the joints do this, those aside of which a first look leaves a few.
+    pub fn outside(model: &Model, ranges: &[Range]) -> Vec<Candidate> {
         let mut all = Vec::new();
         for kind in Kind::OUTSIDE {
-            let shapes = match kind.card().knob.map(|knob| knob.grid) {
-                None => vec![0.0],
-                Some(Grid::Fixed(grid)) => grid(),
-                Some(_) => Vec::new(),
-            };
-            let places = kind.card().place.of(model);
-            let at = |shape: f64| places.iter().map(move |joints| Candidate::at(kind, joints.clone(), shape));
-            all.extend(shapes.into_iter().flat_map(at));
+            let grid = kind.card().knob.map(|knob| knob.grid);
+            for joints in kind.card().place.of(model) {
+                let shapes = match grid {
+                    None => vec![0.0],
+                    Some(Grid::Fixed(grid)) => grid(),
+                    Some(Grid::OfJoint(grid)) => joints.iter().flat_map(|&j| grid(&ranges[j])).collect(),
+                    Some(Grid::Scanned(_)) => Vec::new(),
+                };
+                all.extend(shapes.into_iter().map(|shape| Candidate::at(kind, joints.clone(), shape)));
+            }
         }
+        all.retain(|c| c.shape.is_finite());
         all
     }
 

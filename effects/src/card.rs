@@ -22,6 +22,9 @@ pub struct Card {
     pub late: Option<Late>,
     /// Other kinds that it cannot stand beside at the same joints.
     pub excludes: &'static [Kind],
+    /// Whether it is looked for only in the place of all that was found at its joint beyond calibration: a law outside the catalogue
+    /// that bends to nearly any torque of a position would take what others leave.
+    pub only_instead: bool,
     /// What is asked for as its least size that logs would have shown.
     pub size: Size,
     /// What its curve is drawn over.
@@ -311,6 +314,7 @@ impl Card {
         force: None,
         late: None,
         excludes: &[],
+        only_instead: false,
         size: Size::Unasked,
         axis: Axis::Prediction,
         apart: Apart::Unknown,

@@ -73,6 +73,8 @@ macro_rules! catalogue {
                 rub Rub 25,
                 /// Outside the catalogue: torque at one place of a joint's travel.
                 catch Catch 26,
+                /// Outside the catalogue: a spring that stiffens along a joint's travel.
+                nonlinear_spring NonlinearSpring 31,
             }
         }
     };

@@ -4,6 +4,7 @@
 pub(crate) mod catch;
 pub(crate) mod joint_drag;
 pub(crate) mod link_drag;
+pub(crate) mod nonlinear_spring;
 pub(crate) mod rub;
 pub(crate) mod swing;
 

@@ -303,6 +303,7 @@ pub(crate) fn draw(
             | Kind::Swing
             | Kind::Rub
             | Kind::Catch
+            | Kind::NonlinearSpring
             | Kind::ServoGainError
             | Kind::ServoDampingError
             | Kind::SpeedLimit

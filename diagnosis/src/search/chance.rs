@@ -162,6 +162,9 @@ mod tests {
         // Where it is.
         let (exact, fit) = loose.data(&found.noise).exact(&found.all, &found.choice.set, None).unwrap();
         let stiff = Chosen { turned: None, ..found.with(found.choice.clone(), exact, fit) };
+        // Three nats as any kind beyond calibration, and one of 13 gaps with 8 rotors, 2 sides of the encoder and 2 joints.
+        let price = stiff.prior() - found.prior();
+        assert!((price - 3.0 - (13.0 * 8.0 * 2.0 * 2.0f64).ln()).abs() < 1e-9, "{price}");
         let (gained, by_chance) = gain(&loose, &found, &stiff);
         assert!(gained > 100.0 && by_chance < 0.1 * gained, "{gained} {by_chance}");
         // Where it is not, a gap as narrow as the noise is wide.

@@ -11,6 +11,7 @@ impl Record<'_> {
         let chosen = self.delay_or_lag(chosen)?;
         let chosen = self.drive(chosen, None, progress)?;
         let chosen = self.likeliest(chosen, progress)?;
+        let chosen = self.unbent(chosen, progress)?;
         let chosen = self.needed(self.shown(chosen, progress)?, progress)?;
         let chosen = self.held_back(chosen)?;
         let mut chosen = self.delay_or_lag(self.sticking(chosen)?)?;

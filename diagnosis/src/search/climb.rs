@@ -257,6 +257,7 @@ impl<'a> Competition<'a> {
     ) -> Vec<(f64, Vec<usize>)> {
         let open: Vec<usize> = (0..self.columns.len())
             .filter(|&c| !set.contains(&c) && !forbidden.contains(&self.kind(c)) && may(c))
+            .filter(|&c| !self.kind(c).card().only_instead)
             .collect();
         let groups: Vec<Range<usize>> = open.iter().map(|&c| self.columns[c].clone()).collect();
         let mut found: Vec<(f64, usize)> = score

@@ -38,7 +38,7 @@ impl Record<'_> {
         let loaded = data.loaded(&calibrated, &Fit::on_all(&calibrated, &at))?;
         let data = Data { signals: &loaded, ..data };
         candidates.retain(|c| !c.kind.card().unit_coefficient || limits[c.joints[0]].contains(&c.shape));
-        let outside = Candidate::outside(self.model);
+        let outside = Candidate::outside(self.model, &ranges);
         candidates.extend(screen::ripples(&data, &ranges, &residuals, &outside));
         candidates.extend(screen::places(&data, &ranges, &residuals, &outside));
         candidates.extend(outside);

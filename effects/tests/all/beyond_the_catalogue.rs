@@ -99,6 +99,31 @@ fn a_mass_on_a_stiff_spring_is_carried_along() {
     assert!(worst < 0.02 * largest, "{worst} of {largest}");
 }
 
+/// The torque of a spring that stiffens is the slope of its energy, k x²/2 + h x⁴/4 − t x: what it takes on the way out it gives back.
+#[test]
+fn a_spring_that_stiffens_has_an_energy() {
+    let run = Run::new();
+    let (at, coefficients) = (0.3, [1.5, 4.0, 0.7]);
+    let spring = Candidate { shape: at, ..Candidate::new(Kind::NonlinearSpring, vec![2]) };
+    let columns = run.columns(&spring);
+    let torque = |k: usize| coefficients.iter().zip(&columns).map(|(c, column)| c * column.rows[0].1[k]).sum::<f64>();
+    let energy = |k: usize| {
+        let x = run.q[2][k] - at;
+        coefficients[0] * x.powi(2) / 2.0 + coefficients[1] * x.powi(4) / 4.0 - coefficients[2] * x
+    };
+    for k in (10..SAMPLES - 10).step_by(50) {
+        let power = (energy(k + 1) - energy(k - 1)) / (2.0 * DT);
+        assert!((power - torque(k) * run.v[2][k]).abs() < 1e-4, "{k}");
+    }
+    assert!(columns[1].at_least == 0.0 && columns[0].at_least < 0.0, "it stiffens, wherever it begins to");
+    let range = Range { speed: 1.0, least: -1.0, span: 2.0, torque: 1.0, duration: 1.0 };
+    let ranges = vec![range; run.model.dof()];
+    let of_joint = |c: &&Candidate| c.kind == Kind::NonlinearSpring && c.joints == [2];
+    let all = Candidate::outside(&run.model, &ranges);
+    let shapes: Vec<f64> = all.iter().filter(of_joint).map(|c| c.shape).collect();
+    assert_eq!(shapes, [-0.5, -0.25, 0.0, 0.25, 0.5]);
+}
+
 #[test]
 fn rubs_and_catches_at_every_place_are_friction_and_a_bias() {
     let run = Run::new();

@@ -4,7 +4,7 @@
 use gapscope_datasets::{Episode, Recipe, Sensors, generate};
 use gapscope_diagnosis::schema::{Diagnosis, Verdict};
 use gapscope_dynamics::{Data, Model};
-use gapscope_effects::{ActuationDelay, Armature, Backlash, Effect, TorqueRipple, ViscousFriction};
+use gapscope_effects::{ActuationDelay, Armature, Backlash, Effect, ParallelSpring, TorqueRipple, ViscousFriction};
 use gapscope_tests::{diagnose, recipe, robot};
 use nalgebra::DMatrix;
 
@@ -28,6 +28,13 @@ fn drag(model: &Model, q: &[f64], v: &[f64]) -> Vec<f64> {
 fn rub(model: &Model, q: &[f64], v: &[f64]) -> Vec<f64> {
     let mut torque = vec![0.0; model.dof()];
     torque[1] = 0.3 * (-((q[1] - 0.2) / 0.1).powi(2)).exp() * (v[1] / 0.01).tanh();
+    torque
+}
+
+/// A hose that stiffens on either side of 0.1 rad in the second joint.
+fn hose(model: &Model, q: &[f64], _: &[f64]) -> Vec<f64> {
+    let mut torque = vec![0.0; model.dof()];
+    torque[1] = 2.0 * (q[1] - 0.1).powi(3);
     torque
 }
 
@@ -78,9 +85,31 @@ fn a_law_that_takes_what_concerns_nobody_leaves_the_gap_explained() {
     let ripple = TorqueRipple { amplitude: on(0.3), cycles: on(14.0), phase: on(5.07) };
     let log = |seed| generate(&model, &[Effect::TorqueRipple(ripple.clone())], seed, &recipe(), "log.csv").unwrap();
     let found = diagnose(&model, &(1..5).map(log).collect::<Vec<_>>()).diagnosis;
-    eprintln!("{:?} {:?} {:?}", laws(&found), found.verdict, found.unexplained.fraction);
     assert_eq!(laws(&found), ["joint_drag"], "else this is no test");
     assert_eq!(found.verdict, Verdict::Explained, "{:?}", found.unexplained);
+}
+
+/// A linear spring is the nearest that the catalogue has, and is none.
+#[test]
+fn a_hose_that_stiffens_is_no_spring() {
+    let found = diagnosed(&[], &hose);
+    assert!(found.effects.is_empty(), "{:#?}", found.effects);
+    assert_eq!(found.verdict, Verdict::UnknownEffect);
+    assert_eq!(laws(&found), ["nonlinear_spring"]);
+    assert!(found.unexplained.resembles.unwrap().share > 0.9);
+}
+
+/// And a spring is no hose, be it slack where no joint goes.
+#[test]
+fn a_spring_is_no_hose_that_stiffens() {
+    let model = robot(ROBOT);
+    let on = |value: f64| [(model.joints()[1].name.clone(), value)].into();
+    let spring = Effect::ParallelSpring(ParallelSpring { stiffness: on(2.0), rest_position: on(3.0) });
+    let found = diagnosed(&[spring], &|model, _, _| vec![0.0; model.dof()]);
+    let kinds: Vec<&str> = found.effects.iter().map(|e| e.kind.as_str()).collect();
+    assert_eq!(kinds, ["parallel_spring"], "{:#?}", found.effects);
+    assert_eq!(found.verdict, Verdict::Explained);
+    assert!(laws(&found).is_empty(), "{:?}", laws(&found));
 }
 
 #[test]

@@ -76,7 +76,7 @@ fn a_drag_alone_is_unknown_and_said_to_be_like_a_drag() {
     assert!(found.unexplained.resembles.unwrap().share > 0.95);
 }
 
-/// A light wrist whose ripple passes at 36 Hz: at 500 samples a second its law is exact to .3 % of the effort, and a drag takes that.
+/// A light wrist whose ripple passes at tens of hertz: from sample to sample its law is not exact, and a drag takes what it leaves.
 #[test]
 fn a_law_that_takes_what_concerns_nobody_leaves_the_gap_explained() {
     let model = robot("arm6");
